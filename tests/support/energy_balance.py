@@ -37,7 +37,7 @@ def energy_balance(config: SimConfig, lattice: Lattice, trajectory: Trajectory) 
     shear = 0.5 * config.shear_stiffness_N_m * float(((slider - u) ** 2).sum())
     return EnergyBalance(
         work_J=config.speed_m_s * trajectory.end_impulse_Ns,
-        elastic_J=shear + _spring_energy(config, lattice, u),
+        elastic_J=shear + _spring_energy(config, lattice, u) + trajectory.bond_energy_J,
         kinetic_J=0.5 * config.mass_kg * float((v**2).sum()),
         friction_J=trajectory.friction_work_J,
         viscous_J=trajectory.viscous_work_J,

@@ -82,6 +82,7 @@ OPEN_CHOICES: dict[str, Any] = {
     "restrengthening": 1.0,
     "sticking": "turned",
     "stick_interval_s": None,
+    "contact_stiffness_Pa_per_m": None,
 }
 """What the text leaves open and changes a run, with the values of the reading "text"."""
 
@@ -136,6 +137,9 @@ class SimConfig:
         When a sliding block comes to rest: "turned", once a step turns its velocity by more than 90 degrees; "slow",
         once it is slower than ``stick_speed_m_s``; "never", friction follows the velocity at every stage of a step.
         Tested every ``stick_interval_s``, at every step by default. Only the reference engine has others than "turned".
+    contact_stiffness_Pa_per_m
+        Stiffness kappa of contact per area: a spring kappa l2 binds each contact block to the track and yields at its
+        static threshold. None, the reading of the paper, is rigid contact. A stiffer one needs a shorter step.
     blocks, spacing_m, thickness_m
         Blocks along x and y, their distance l, and the layer thickness l_z (l by default).
     block_mass
@@ -191,6 +195,7 @@ class SimConfig:
     sticking: Sticking = "turned"
     stick_speed_m_s: float = 2e-4
     stick_interval_s: float | None = None
+    contact_stiffness_Pa_per_m: float | None = None
     blocks: tuple[int, int] = (85, 85)
     spacing_m: float = 5e-6
     thickness_m: float | None = None
@@ -252,6 +257,11 @@ class SimConfig:
         return self.shear_factor * self.stiffness_N_m * (self.spacing_m / self.layer_m) ** 2
 
     @property
+    def bond_stiffness_N_m(self) -> float:
+        """kappa l2, the stiffness of the contact of one block; zero where contact is rigid."""
+        return (self.contact_stiffness_Pa_per_m or 0.0) * self.spacing_m**2
+
+    @property
     def mass_kg(self) -> float:
         height_m = self.spacing_m if self.block_mass == "cube" else self.layer_m
         return self.density_kg_m3 * self.spacing_m**2 * height_m
@@ -264,7 +274,9 @@ class SimConfig:
     @property
     def largest_dt_s(self) -> float:
         """Where the explicit step turns unstable: the stiffest lattice mode with its damping."""
-        omega2 = (STIFFEST * self.stiffness_N_m + self.shear_stiffness_N_m) / self.mass_kg
+        omega2 = (
+            STIFFEST * self.stiffness_N_m + self.shear_stiffness_N_m + self.bond_stiffness_N_m
+        ) / self.mass_kg
         # v' = (1 - g dt) v - w2 dt x, x' = x + dt v' is stable while (w dt)^2 < 4 - 2 g dt
         g = self.damping_per_s
         return (math.sqrt(g**2 + 4.0 * omega2) - g) / omega2
@@ -306,7 +318,7 @@ def _unknown_sample(sample: str) -> Problem:
 _POSITIVE = {
     "stick_speed_m_s", "stick_interval_s", "pressure_Pa", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3",
     "speed_m_s", "shear_factor", "dt_s", "duration_s", "sample_interval_s", "rest_tolerance", "ageing_t0_s",
-    "speed_v0_m_s",
+    "speed_v0_m_s", "contact_stiffness_Pa_per_m",
 }  # fmt: skip
 _NOT_NEGATIVE = {"damping_per_s", "mu_s", "mu_s_sd", "mu_d", "mu_d_sd", "ageing_b", "hold_s"}
 _BEYOND_THE_PEAK = {"duration_peaks", "window_start_peaks", "window_end_peaks"}
@@ -319,7 +331,10 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "block_mass": ("layer", "cube"),
     "sticking": ("turned", "slow", "never"),
 }
-_OF_THE_STEP = {"dt_s", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "damping_per_s", "shear_factor"}
+_OF_THE_STEP = {
+    "dt_s", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "damping_per_s", "shear_factor",
+    "contact_stiffness_Pa_per_m",
+}  # fmt: skip
 _OF_THE_GEOMETRY = {"spacing_m", "edges", "cavity_shape"}
 _OF_THE_WINDOW = {"window_start_peaks", "window_end_peaks"}
 
@@ -370,6 +385,11 @@ def _unsupported(config: SimConfig) -> Iterator[Problem]:
                 "unsupported", f"the {config.engine} engine supports only the default", column=name,
                 found=str(found), allowed=f"the default, or engine {engines_with('sticking_rules')}",
             )  # fmt: skip
+    if config.contact_stiffness_Pa_per_m is not None and not engine.elastic_contact:
+        yield Problem(
+            "unsupported", f"the {config.engine} engine has rigid contact only", column="contact_stiffness_Pa_per_m",
+            found=f"{config.contact_stiffness_Pa_per_m:g}", allowed=f"engine {engines_with('elastic_contact')}",
+        )  # fmt: skip
     if config.terms.active and not engine.friction_terms:
         yield Problem(
             "unsupported", f"the {config.engine} engine supports only the friction law of the paper", column="engine",

@@ -124,8 +124,9 @@ class Lattice:
     """Geometry of a lattice with unit K_int; block i = y nx + x. ``neighbours`` is n where a spring is missing.
 
     ``own`` holds the stiffness (xx, yy, xy) of each block against the fixed rest, shear spring included;
-    ``follow[i]`` the 2 x 2 matrix that turns the velocity of the slider into that of a cavity block while all
-    contact blocks stick; ``lag[i]`` turns it into the displacement by which unit drag per velocity holds it back.
+    ``follow[i]`` the 2 x 2 matrix that turns the velocity of the slider into that of a block that moves while all
+    contact blocks stick: a cavity, or any block where contact is elastic; ``lag[i]`` turns it into the displacement by
+    which unit drag per velocity holds it back. ``bond`` is the stiffness of contact, None where it is rigid.
     """
 
     nx: int
@@ -137,6 +138,7 @@ class Lattice:
     own: FloatArray  # (n + 1, 3)
     follow: FloatArray  # (n + 1, 2, 2)
     lag: FloatArray  # (n + 1, 2, 2)
+    bond: FloatArray | None = None  # (n,) zero on cavities
 
     @property
     def area_fraction(self) -> float:
@@ -156,14 +158,19 @@ class Lattice:
         return np.asarray(force[:-1])
 
 
-def make_lattice(mask: BoolArray, shear: float, periodic: bool) -> Lattice:
-    """Lattice of a contact mask (ny, nx); ``shear`` is K_s / K_int. One factorisation a mask, kept for later."""
+def make_lattice(mask: BoolArray, shear: float, periodic: bool, bond: float | None = None) -> Lattice:
+    """Lattice of a contact mask (ny, nx); ``shear`` is K_s / K_int, ``bond`` the stiffness of contact, None if rigid.
+
+    One factorisation a mask, kept for later.
+    """
     packed = np.packbits(mask).tobytes()
-    return _make_lattice(packed, mask.shape, shear, periodic)
+    return _make_lattice(packed, mask.shape, shear, periodic, bond)
 
 
 @lru_cache(maxsize=16)
-def _make_lattice(packed: bytes, shape: tuple[int, int], shear: float, periodic: bool) -> Lattice:
+def _make_lattice(
+    packed: bytes, shape: tuple[int, int], shear: float, periodic: bool, stiffness: float | None
+) -> Lattice:
     ny, nx = shape
     n = nx * ny
     contact = np.unpackbits(np.frombuffer(packed, np.uint8), count=n).astype(bool)
@@ -172,8 +179,14 @@ def _make_lattice(packed: bytes, shape: tuple[int, int], shear: float, periodic:
     for k, spring in enumerate(SPRINGS):
         own[:n] += np.where(neighbours[:n, k, None] < n, spring, 0.0)
     own[:n, :2] += shear
-    follow, lag = _condense(contact, neighbours, own, shear)
-    return Lattice(nx, ny, periodic, shear, contact, neighbours, own, follow, lag)
+    bond = None if stiffness is None else np.where(contact, stiffness, 0.0)
+    if bond is None:
+        follow, lag = _condense(np.flatnonzero(~contact), neighbours, own, shear)
+    else:
+        held = own.copy()
+        held[:n, :2] += bond[:, None]
+        follow, lag = _condense(np.arange(n), neighbours, held, shear)
+    return Lattice(nx, ny, periodic, shear, contact, neighbours, own, follow, lag, bond)
 
 
 def _neighbours(nx: int, ny: int, periodic: bool) -> NDArray[np.int64]:
@@ -189,34 +202,32 @@ def _neighbours(nx: int, ny: int, periodic: bool) -> NDArray[np.int64]:
 
 
 def _condense(
-    contact: NDArray[np.bool_], neighbours: NDArray[np.int64], own: FloatArray, shear: float
+    moving: NDArray[np.intp], neighbours: NDArray[np.int64], own: FloatArray, shear: float
 ) -> tuple[FloatArray, FloatArray]:
-    """K_cc w = K_s V and K_cc z = w: cavity velocities, and their lag per drag, for unit V along x and y."""
-    n = len(contact)
-    follow, lag = np.zeros((n + 1, 2, 2)), np.zeros((n + 1, 2, 2))
-    cavity = np.flatnonzero(~contact)
-    if cavity.size == 0:
+    """K w = K_s V and K z = w over the blocks that move: velocities, and lag per drag, for unit V along x and y."""
+    follow, lag = np.zeros((len(own), 2, 2)), np.zeros((len(own), 2, 2))
+    if moving.size == 0:
         return follow, lag
-    solve = _factorise(cavity, neighbours, own)
-    m = cavity.size
+    solve = _factorise(moving, neighbours, own)
+    m = moving.size
     drive = np.zeros((2 * m, 2))
     drive[:m, 0] = drive[m:, 1] = shear
     w = solve(drive)
     z = solve(w)
     for axis in range(2):
         rows = slice(axis * m, (axis + 1) * m)
-        follow[cavity, axis], lag[cavity, axis] = w[rows], z[rows]
+        follow[moving, axis], lag[moving, axis] = w[rows], z[rows]
     return follow, lag
 
 
-def _factorise(cavity: NDArray[np.intp], neighbours: NDArray[np.int64], own: FloatArray) -> Any:
-    """Solver of the cavity block of the stiffness matrix, x components first."""
+def _factorise(moving: NDArray[np.intp], neighbours: NDArray[np.int64], own: FloatArray) -> Any:
+    """Solver of the stiffness matrix of the blocks that move, x components first."""
     from scipy.sparse import coo_array
     from scipy.sparse.linalg import splu
 
-    m = cavity.size
+    m = moving.size
     number = np.full(len(own), -1)
-    number[cavity] = np.arange(m)
+    number[moving] = np.arange(m)
     rows, columns, values = [], [], []
 
     def add(row: Any, column: Any, xx: Any, yy: Any, xy: Any) -> None:
@@ -225,9 +236,9 @@ def _factorise(cavity: NDArray[np.intp], neighbours: NDArray[np.int64], own: Flo
             columns.append(column + b * m)
             values.append(np.broadcast_to(value, np.shape(row)))
 
-    add(np.arange(m), np.arange(m), *own[cavity].T)
+    add(np.arange(m), np.arange(m), *own[moving].T)
     for k, (xx, yy, xy) in enumerate(SPRINGS):
-        near = number[neighbours[cavity, k]]
+        near = number[neighbours[moving, k]]
         linked = near >= 0
         add(np.flatnonzero(linked), near[linked], -xx, -yy, -xy)
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))

@@ -25,15 +25,16 @@ class Engine:
     ----------
     module
         Has a function ``integrate(config, lattice, thresholds, threads)`` that returns a Trajectory.
-    finite_rotation, friction_terms, sticking_rules
-        Whether it has springs that turn with their ends, friction that changes during a run, and rules of sticking
-        other than the default.
+    finite_rotation, friction_terms, sticking_rules, elastic_contact
+        Whether it has springs that turn with their ends, friction that changes during a run, rules of sticking
+        other than the default, and contact of finite stiffness.
     """
 
     module: str
     finite_rotation: bool = False
     friction_terms: bool = False
     sticking_rules: bool = False
+    elastic_contact: bool = False
 
     @property
     def integrate(self) -> Integrate:
@@ -42,8 +43,10 @@ class Engine:
 
 
 ENGINES: dict[str, Engine] = {
-    "fast": Engine("tribo.springblock.engines.fast", friction_terms=True),
-    "reference": Engine("tribo.springblock.engines.reference", finite_rotation=True, sticking_rules=True),
+    "fast": Engine("tribo.springblock.engines.fast", friction_terms=True, elastic_contact=True),
+    "reference": Engine(
+        "tribo.springblock.engines.reference", finite_rotation=True, sticking_rules=True, elastic_contact=True
+    ),
 }
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.records import FloatArray
+from tribo.springblock.engines.bonds import bond_force, bound_forces, bound_glides, bound_slides
 from tribo.springblock.engines.jit import compiled, copied_into_callers, inner
 from tribo.springblock.engines.state import (
     ACTIVE_STEPS,
@@ -33,7 +34,19 @@ from tribo.springblock.engines.state import (
     observe,
     static_threshold,
 )
-from tribo.springblock.engines.strips import CAVITY, CONTACT, LANES, Planes, Sums, forces, glides, slides, wrap
+from tribo.springblock.engines.strips import (
+    CAVITY,
+    CONTACT,
+    LANES,
+    NOTHING,
+    IntArray,
+    Planes,
+    Sums,
+    forces,
+    glides,
+    slides,
+    wrap,
+)
 from tribo.springblock.engines.team import (
     END,
     FORCES,
@@ -76,7 +89,7 @@ class Lists(NamedTuple):
 
 
 def lists_of(cavity: NDArray[np.bool_], c: Numerics, shares: int) -> Lists:
-    """All strips asleep, in so many shares. ``cavity`` (strips, lanes) tells the cavity blocks."""
+    """All strips asleep, in so many shares. ``cavity`` (strips, lanes) tells the blocks that move without slipping."""
     n, lanes = cavity.shape
     across = -(-c.nx // lanes)
     y, x = np.divmod(np.arange(n), across)
@@ -222,7 +235,8 @@ def active_of(planes: Planes, numerics: Numerics, threads: int = 1) -> Active:
     n = len(planes.place)
     shares = shares_of(numerics.nx * numerics.ny)
     lanes = planes.place[:, None] + np.arange(LANES)
-    lists = lists_of(planes.kind[lanes] == CAVITY, numerics, shares)
+    free = planes.kind[lanes] == CAVITY if numerics.elastic is None else planes.kind[lanes] != NOTHING
+    lists = lists_of(free, numerics, shares)
     for strip in np.flatnonzero((planes.pace[lanes] != 0.0).any(axis=1)):
         here = lanes[strip]
         planes.hold[here[planes.kind[here] == CAVITY]] = np.inf
@@ -237,16 +251,71 @@ def active_of(planes: Planes, numerics: Numerics, threads: int = 1) -> Active:
 
 
 @inner
-def hold_cavities(strip: int, hold: float, p: Planes) -> None:
-    """The cavity blocks of a strip rest up to a force, which is infinite while they move."""
+def hold_cavities(strip: int, hold: float, p: Planes, elastic: bool | None) -> None:
+    """The cavity blocks of a strip, and bound ones, rest up to a force, which is infinite while they move."""
     copied_into_callers()
     first = p.place[strip]
     for i in range(first, first + LANES):
-        if p.kind[i] == CAVITY:
-            p.hold[i] = hold
+        if elastic is None:
+            if p.kind[i] == CAVITY:
+                p.hold[i] = hold
+                if hold < np.inf:
+                    p.p_x[i] = 0.0
+                    p.p_y[i] = 0.0
+        elif p.kind[i] != NOTHING:
+            p.wake[i] = hold
             if hold < np.inf:
                 p.p_x[i] = 0.0
                 p.p_y[i] = 0.0
+
+
+@inner
+def load_on(i: int, t: float, p: Planes, c: Numerics, elastic: bool | None) -> tuple[float, float]:
+    """What a contact block has to hold: the force on it, or that of its bond at time t."""
+    copied_into_callers()
+    if elastic is None:
+        return p.f_x[i], p.f_y[i]
+    elapsed = t * c.dt / c.mass
+    return (
+        bond_force(p.bond[i], p.frame_x[i], p.q_x[i], p.anchor_x[i], elapsed),
+        bond_force(p.bond[i], p.frame_y[i], p.q_y[i], p.anchor_y[i], elapsed),
+    )
+
+
+@inner
+def load_rate(i: int, p: Planes, c: Numerics, elastic: bool | None) -> tuple[float, float]:
+    """N/s by which what a contact block has to hold grows while nothing moves beyond the quasi-static motion."""
+    copied_into_callers()
+    if elastic is None:
+        return p.pull_x[i], p.pull_y[i]
+    rate = p.bond[i] * c.dt / c.mass
+    return rate * p.frame_x[i], rate * p.frame_y[i]
+
+
+@inner
+def any_forces(
+    p: Planes, strips: IntArray, starts: NDArray[np.bool_], c: Numerics, t: float, elastic: bool | None
+) -> None:
+    """Forces of these strips, with rigid or with elastic contact."""
+    copied_into_callers()
+    if elastic is None:
+        forces(p, strips, starts, c, t)
+    else:
+        bound_forces(p, strips, starts, c, t)
+
+
+@inner
+def any_motion(
+    gliding: IntArray, sliding: IntArray, a: Active, c: Numerics, step: int, sums: Sums, elastic: bool | None
+) -> None:
+    """Move these strips, with rigid or with elastic contact."""
+    copied_into_callers()
+    if elastic is None:
+        glides(a.planes, gliding, a.calm, c, sums)
+        slides(a.planes, sliding, a.moving, c, step, sums)
+    else:
+        bound_glides(a.planes, gliding, a.calm, c, sums)
+        bound_slides(a.planes, sliding, a.moving, c, step, sums)
 
 
 @inner
@@ -258,7 +327,8 @@ def slipping(strip: int, s: State, p: Planes, c: Numerics) -> int:
     reach = 0
     for i in range(first, first + LANES):
         hold = static_threshold(p.hold[i], t - p.since[i], c.law)
-        if p.kind[i] != CONTACT or p.f_x[i] * p.f_x[i] + p.f_y[i] * p.f_y[i] <= hold * hold:
+        f_x, f_y = load_on(i, t, p, c, c.elastic)
+        if p.kind[i] != CONTACT or f_x * f_x + f_y * f_y <= hold * hold:
             continue
         y, x = divmod(i - p.first, p.width)
         reach |= MIDDLE | (WEST if i == first else 0) | (EAST if i == first + LANES - 1 or x == c.nx - 1 else 0)
@@ -284,7 +354,7 @@ def find_forces(thread: int, threads: int, s: State, a: Active, c: Numerics) -> 
     t = c.start + s.counts[STEP] * c.dt
     for row in range(lists.shares * ASLEEP):
         if row % threads == thread:
-            forces(a.planes, lists.strips[row, : lists.members[row]], a.starts, c, t)
+            any_forces(a.planes, lists.strips[row, : lists.members[row]], a.starts, c, t, c.elastic)
 
 
 @inner
@@ -293,11 +363,10 @@ def move(thread: int, threads: int, s: State, a: Active, c: Numerics) -> None:
     copied_into_callers()
     lists = a.lists
     for share in range(thread, lists.shares, threads):
-        row = lists.shares * GLIDING + share
+        row, further = lists.shares * GLIDING + share, lists.shares * SLIDING + share
         sums = Sums(a.sums.along[share], a.sums.squares[share], a.sums.work[share])
-        glides(a.planes, lists.strips[row, : lists.members[row]], a.calm, c, sums)
-        row = lists.shares * SLIDING + share
-        slides(a.planes, lists.strips[row, : lists.members[row]], a.moving, c, s.counts[STEP], sums)
+        gliding, sliding = lists.strips[row, : lists.members[row]], lists.strips[further, : lists.members[further]]
+        any_motion(gliding, sliding, a, c, s.counts[STEP], sums, c.elastic)
 
 
 @compiled
@@ -338,7 +407,7 @@ def start_all(s: State, a: Active, c: Numerics) -> None:
             if to != status:
                 leave(strip, lists)
                 join(strip, to, lists)
-                hold_cavities(strip, np.inf, a.planes)
+                hold_cavities(strip, np.inf, a.planes, c.elastic)
             set_reach(strip, reach | lists.links[strip, REACH] | lists.links[strip, OWN_REACH], lists)
 
 
@@ -353,7 +422,7 @@ def rest_all(a: Active, c: Numerics) -> None:
             strip = lists.strips[row, m]
             m -= 1
             if a.calm[strip]:
-                hold_cavities(strip, 2.0 * c.rest_force, a.planes)
+                hold_cavities(strip, 2.0 * c.rest_force, a.planes, c.elastic)
                 leave(strip, lists)
                 rest(strip, lists)
                 set_reach(strip, 0, lists)
@@ -386,7 +455,7 @@ def queue_pending(s: State, a: Active, c: Numerics) -> None:
             lists.strips[PENDING, n] = strip
             n += 1
     lists.members[PENDING] = 0
-    forces(a.planes, lists.strips[PENDING, :n], a.starts, c, 0.0)
+    any_forces(a.planes, lists.strips[PENDING, :n], a.starts, c, 0.0, c.elastic)
     for m in range(n):
         a.starts[lists.strips[PENDING, m]] = False  # the comparison with the force at t = 0 means nothing
         t_fail = first_failure(lists.strips[PENDING, m], s, a.planes, c)
@@ -408,9 +477,11 @@ def first_failure(strip: int, s: State, p: Planes, c: Numerics) -> float:
         if p.kind[i] != CONTACT:
             continue
         limit = static_threshold(p.hold[i], t_now - p.since[i], c.law)
-        a = p.pull_x[i] * p.pull_x[i] + p.pull_y[i] * p.pull_y[i]
-        b = p.f_x[i] * p.pull_x[i] + p.f_y[i] * p.pull_y[i]
-        excess = p.f_x[i] * p.f_x[i] + p.f_y[i] * p.f_y[i] - limit * limit
+        pull_x, pull_y = load_rate(i, p, c, c.elastic)
+        f_x, f_y = load_on(i, 0.0, p, c, c.elastic)
+        a = pull_x * pull_x + pull_y * pull_y
+        b = f_x * pull_x + f_y * pull_y
+        excess = f_x * f_x + f_y * f_y - limit * limit
         if a > 0.0:
             root = b * b - a * excess
             earliest = min(earliest, (math.sqrt(root) - b) / a if root > 0.0 else t_now)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.springblock.config import SimConfig
 from tribo.springblock.engines import state as k
 from tribo.springblock.engines.active import Active, active_of, advance, assist
+from tribo.springblock.engines.bonds import energy_of_bonds
 from tribo.springblock.engines.jit import uncollected
 from tribo.springblock.engines.start import SliderDrive, Thresholds, Trajectory, drive_of, first_failure_s, once
 from tribo.springblock.engines.state import packed
@@ -38,7 +40,12 @@ def integrate(config: SimConfig, lattice: Lattice, thresholds: Thresholds, threa
         for samples, step in in_chunks(config, thresholds, state, numerics, kept):
             advance(active, state, samples, numerics, step)
     put_back(active, state, numerics)
-    return trajectory_of(kept, state, numerics, drive, failure)
+    trajectory = trajectory_of(kept, state, numerics, drive, failure)
+    if lattice.bond is None:
+        return trajectory
+    inside = places_of(active.planes.first, active.planes.width, numerics.nx, numerics.ny)
+    elapsed = trajectory.end_s * numerics.dt / numerics.mass
+    return replace(trajectory, bond_energy_J=energy_of_bonds(active.planes, inside, elapsed))
 
 
 def in_chunks(
@@ -70,7 +77,7 @@ def active_set(
     """What the compiled loop of the fast engine works on."""
     drag = -config.mass_kg * config.damping_per_s * drive.follow
     pull = np.where(lattice.contact[:, None], drive.rate, drag)
-    return active_of(planes_of(state, numerics, lattice, pull), numerics, threads)
+    return active_of(planes_of(state, numerics, lattice, pull, drive.follow), numerics, threads)
 
 
 def put_back(active: Active, state: k.State, numerics: k.Numerics) -> None:
@@ -111,6 +118,7 @@ def at_rest(
         stop_at_peaks=np.inf if config.duration_s is not None else config.duration_peaks,
         peak_drop=config.peak_drop,
         law=packed(config.terms),
+        elastic=None if lattice.bond is None else True,
     )
     n = lattice.contact.size
     cells = np.zeros((n, k.WIDTH))

@@ -12,6 +12,8 @@ the text gives no details, these choices were made:
 - A sliding block comes to rest when a step turns its velocity by more than a right angle. Its position stays
   that of the step; its velocity becomes zero. Other rules (``sticking``) replace this one on request.
 - Cavity blocks feel no friction and never stick.
+- Where contact is elastic, a block at rest is bound to the track by a spring and moves with it. The spring yields at
+  the static threshold; a block that comes to rest is bound again by a spring that holds it with its sliding friction.
 - A run starts at a given share of the first failure, the contact blocks unmoved and the cavities at their
   quasi-static displacement and velocity; what finite rotation adds to that dies out within microseconds.
 """
@@ -53,6 +55,9 @@ class Model(NamedTuple):
     rule: int  # when a sliding block comes to rest: TURNED, SLOW or NEVER
     slow: float  # m/s, for SLOW
     test_every: int  # steps between two tests for rest
+    elastic: bool
+    bond: FloatArray  # (n,) stiffness of contact, zero on cavities and where it is rigid
+    anchor: FloatArray  # (n, 2) displacement at which the spring of a bound block is free of force
     start: float  # s
     dt: float
     stride: int  # steps from one sample to the next
@@ -115,13 +120,15 @@ def oppose(v: FloatArray, driving: FloatArray, m: Model, friction: FloatArray) -
 def acceleration(
     u: FloatArray, v: FloatArray, t: float, resting: NDArray[np.bool_], friction: FloatArray, m: Model, a: FloatArray
 ) -> None:
-    """m a = F_mot + F_d + F_fr of every block; none for blocks at rest."""
+    """m a = F_mot + F_d + F_fr of every block; blocks at rest have none, or hang on the spring of their contact."""
     driving_force(u, t, m, a)
     if m.rule == NEVER:
         oppose(v, a, m, friction)
     for i in range(len(u)):
         for d in range(2):
-            a[i, d] = 0.0 if resting[i] else (a[i, d] + friction[i, d]) / m.mass - m.damping * v[i, d]
+            held = -m.bond[i] * (u[i, d] - m.anchor[i, d]) if resting[i] else friction[i, d]
+            moves = m.elastic or not resting[i]
+            a[i, d] = (a[i, d] + held) / m.mass - m.damping * v[i, d] if moves else 0.0
 
 
 @compiled
@@ -131,8 +138,13 @@ def decide_friction(m: Model, t: float, friction: FloatArray) -> None:
     driving_force(u, t, m, friction)
     for i in range(len(u)):
         driving = math.sqrt(friction[i, 0] * friction[i, 0] + friction[i, 1] * friction[i, 1])
-        if resting[i] and driving > m.static[i]:
+        held = driving
+        if m.elastic:
+            held = m.bond[i] * math.hypot(u[i, 0] - m.anchor[i, 0], u[i, 1] - m.anchor[i, 1])
+        if resting[i] and held > m.static[i]:
             resting[i] = False
+            if m.elastic:
+                m.sums[FRICTION_WORK] += 0.5 * (held * held - m.sliding[i] * m.sliding[i]) / m.bond[i]
             m.static[i] = m.again[i]
             n = int(m.sums[N_FAILED])
             if n < len(m.failed):
@@ -193,14 +205,20 @@ def finish_step(m: Model, t: float, new_v: FloatArray, tested: bool) -> None:
     force_x = 0.0
     force_y = 0.0
     for i in range(len(u)):
-        if not resting[i]:
+        if m.elastic or not resting[i]:
             before = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-            if tested and m.contact[i] and comes_to_rest(v[i], new_v[i], m):
+            rubs = not resting[i]
+            if rubs and tested and m.contact[i] and comes_to_rest(v[i], new_v[i], m):
                 resting[i] = True
+                if m.elastic:
+                    stretch = min(m.sliding[i], m.static[i]) / (m.bond[i] * max(before, 1e-300))
+                    for d in range(2):
+                        m.anchor[i, d] = u[i, d] - stretch * v[i, d]
                 new_v[i, 0] = 0.0
                 new_v[i, 1] = 0.0
             after = math.sqrt(new_v[i, 0] * new_v[i, 0] + new_v[i, 1] * new_v[i, 1])
-            m.sums[FRICTION_WORK] += 0.5 * dt * m.sliding[i] * (before + after)
+            if rubs:
+                m.sums[FRICTION_WORK] += 0.5 * dt * m.sliding[i] * (before + after)
             m.sums[VISCOUS_WORK] += 0.5 * dt * m.mass * m.damping * (before * before + after * after)
             v[i, 0] = new_v[i, 0]
             v[i, 1] = new_v[i, 1]
@@ -262,6 +280,9 @@ def reference_model(
         rule=RULES.index(config.sticking),
         slow=config.stick_speed_m_s,
         test_every=max(1, round((config.stick_interval_s or 0.0) / config.dt_s)),
+        elastic=lattice.bond is not None,
+        bond=np.zeros(lattice.contact.size) if lattice.bond is None else config.stiffness_N_m * lattice.bond,
+        anchor=np.zeros((lattice.contact.size, 2)),
         start=start_s,
         dt=config.dt_s,
         stride=stride,
@@ -313,7 +334,15 @@ def integrate(
         velocity_m_s=run.v,
         friction_work_J=float(sums[FRICTION_WORK]),
         viscous_work_J=float(sums[VISCOUS_WORK]),
+        bond_energy_J=_bond_energy(run),
     )
+
+
+def _bond_energy(m: Model) -> float:
+    """Energy in the springs of contact; that of a sliding block is stretched by its friction."""
+    stretch = m.bond * np.hypot(*(m.u - m.anchor).T)
+    force = np.where(m.resting, stretch, m.sliding)[m.bond > 0.0]
+    return float(0.5 * (force**2 / m.bond[m.bond > 0.0]).sum())
 
 
 def _refuse(u: FloatArray, lattice: Lattice, t: float) -> None:

@@ -29,9 +29,9 @@ class SliderDrive:
     """Forces while everything sticks: on block i it is ``rate[i] * t``, the cavities moving at ``follow``."""
 
     velocity: FloatArray  # (2,) of the slider
-    follow: FloatArray  # (n, 2) quasi-static velocity of cavity blocks, zero on contact
+    follow: FloatArray  # (n, 2) quasi-static velocity of cavity blocks, zero on rigid contact
     rate: FloatArray  # (n, 2) N/s, zero on cavities
-    lag: FloatArray  # (n, 2) m, displacement of cavity blocks under their steady drag
+    lag: FloatArray  # (n, 2) m, displacement of the blocks that follow under their steady drag
     force_rate: float  # N/s of the slider force along the pull
 
 
@@ -57,12 +57,15 @@ class Trajectory:
     viscous_work_J: float
     dense_steps: int = 0
     active_block_steps: int = 0
+    bond_energy_J: float = 0.0  # in elastic contacts at the end; sliding blocks stretch theirs by friction
 
 
 def lattice_of(config: SimConfig) -> Lattice:
     """The lattice of a configuration."""
     shear = config.shear_stiffness_N_m / config.stiffness_N_m
-    return make_lattice(mask_of(config), shear, config.edges == "periodic")
+    kappa = config.contact_stiffness_Pa_per_m
+    bond = None if kappa is None else kappa * config.spacing_m**2 / config.stiffness_N_m
+    return make_lattice(mask_of(config), shear, config.edges == "periodic", bond)
 
 
 def thresholds_of(config: SimConfig, lattice: Lattice) -> Thresholds:
@@ -92,8 +95,11 @@ def drive_of(config: SimConfig, lattice: Lattice) -> SliderDrive:
     direction = np.array([np.cos(angle), np.sin(angle)])
     velocity = config.speed_m_s * direction
     follow = lattice.follow[:-1] @ velocity
-    rate = config.stiffness_N_m * (lattice.spring_forces(follow) + lattice.shear * velocity)
-    rate[~lattice.contact] = 0.0
+    if lattice.bond is None:
+        rate = config.stiffness_N_m * (lattice.spring_forces(follow) + lattice.shear * velocity)
+        rate[~lattice.contact] = 0.0
+    else:
+        rate = config.stiffness_N_m * lattice.bond[:, None] * follow
     lag = -config.mass_kg * config.damping_per_s / config.stiffness_N_m * (lattice.lag[:-1] @ velocity)
     pulled = lattice.contact.size * config.speed_m_s - float((follow @ direction).sum())
     return SliderDrive(velocity, follow, rate, lag, config.shear_stiffness_N_m * pulled)
@@ -101,7 +107,8 @@ def drive_of(config: SimConfig, lattice: Lattice) -> SliderDrive:
 
 def first_failure_s(lattice: Lattice, thresholds: Thresholds, drive: SliderDrive, stiffness_N_m: float) -> float:
     """Time at which the first contact block reaches its static threshold, exact for small rotations."""
-    force = stiffness_N_m * lattice.spring_forces(drive.lag)[lattice.contact]
+    load = lattice.spring_forces(drive.lag) if lattice.bond is None else lattice.bond[:, None] * drive.lag
+    force = stiffness_N_m * load[lattice.contact]
     rate = drive.rate[lattice.contact]
     limit = thresholds.static_N[lattice.contact]
     a = (rate**2).sum(1)

@@ -121,6 +121,7 @@ class Numerics(NamedTuple):
     stop_at_peaks: float  # stop once the time exceeds this multiple of the peak time
     peak_drop: float  # the first peak is found once the force has fallen by this share
     law: FloatArray | None  # parameters of the friction terms; None compiles to loops without them
+    elastic: bool | None = None  # True where contact is elastic; None compiles to loops of rigid contact
 
 
 @inner

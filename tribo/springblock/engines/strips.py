@@ -97,6 +97,12 @@ class Planes(NamedTuple):
     sliding: FloatArray
     pace: FloatArray  # amount of m v / dt of contact blocks, zero at rest
     since: FloatArray  # time of the last stop; infinite on cavities, which do not age
+    bond: FloatArray  # N/m: stiffness of contact; empty, as the next five, where contact is rigid
+    anchor_x: FloatArray  # displacement at which the bond of a block is free of force
+    anchor_y: FloatArray
+    frame_x: FloatArray  # m w / dt of the quasi-static motion
+    frame_y: FloatArray
+    wake: FloatArray  # force beyond which a block moves in a strip at rest; infinite in others, and where no block is
     place: NDArray[np.int64]  # (strips,) where each begins
     edge: NDArray[np.int64]  # (strips,) where its blocks begin in ``spare``, -1 for strips without free edges
     spare_xx: FloatArray  # N/m: own stiffness that blocks at free edges lack against an inner one
@@ -114,13 +120,21 @@ class Sums(NamedTuple):
     work: FloatArray
 
 
-def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArray) -> Planes:
-    """The blocks of a state as the loops take them. ``pull`` (n, 2): N/s on contact blocks, N on cavity blocks."""
+def planes_of(
+    state: State, numerics: Numerics, lattice: Lattice, pull: FloatArray, follow: FloatArray | None = None
+) -> Planes:
+    """The blocks of a state as the loops take them.
+
+    ``pull`` (n, 2): N/s on contact blocks, N on cavity blocks; ``follow`` (n, 2), their quasi-static velocity, stands
+    in its place where contact is elastic.
+    """
     nx, ny = lattice.nx, lattice.ny
-    first, width, planes = interleaved(nx, ny, 16)
+    bound = lattice.bond is not None
+    first, width, planes = interleaved(nx, ny, 22 if bound else 16)
+    planes += [] if bound else [np.zeros(0)] * 6
     inside = places_of(first, width, nx, ny)
     cells, contact = state.cells, lattice.contact
-    q_x, q_y, q_sum, q_gap, p_x, p_y, _, _, pull_x, pull_y, kind, hold, again, sliding, pace, since = planes
+    q_x, q_y, q_sum, q_gap, p_x, p_y, _, _, pull_x, pull_y, kind, hold, again, sliding, pace, since = planes[:16]
     q_x[inside], q_y[inside] = cells[:, k.QX], cells[:, k.QY]
     q_sum[inside], q_gap[inside] = q_x[inside] + q_y[inside], q_x[inside] - q_y[inside]
     if numerics.periodic:
@@ -139,6 +153,13 @@ def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArr
     hold[inside] = np.where(moves, np.inf, np.where(contact, cells[:, k.FS], 2.0 * numerics.rest_force))
     again[inside], sliding[inside] = cells[:, k.FA], cells[:, k.FD]
     since[inside] = np.where(contact, cells[:, k.SINCE], np.inf)
+    if lattice.bond is not None and follow is not None:
+        bond, _, _, frame_x, frame_y, wake = planes[16:]
+        bond[inside] = numerics.stiffness * lattice.bond
+        frame_x[inside], frame_y[inside] = follow.T * (numerics.mass / numerics.dt)
+        wake[lanes] = hold[lanes]
+        wake[inside] = 2.0 * numerics.rest_force
+        hold[inside[~contact]] = np.inf
     edge, spare = _spare(lattice, numerics.stiffness)
     rows: Any = [*planes, place, edge, *spare, first, width]
     return Planes(*rows)
