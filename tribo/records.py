@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
@@ -325,6 +326,14 @@ STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
 CLOSED_TRACK_M = 10.0  # a longer slide runs over its own track again and again; no sled has so long a track
 
 
+def picture_mask(text: str) -> NDArray[np.bool_]:
+    """The mask (height, width) in the picture of a pattern."""
+    size, _, bits = text.partition(":")
+    width, height = (int(n) for n in size.split("x"))
+    packed = np.frombuffer(bytes.fromhex(bits), np.uint8)
+    return np.unpackbits(packed, count=width * height).astype(bool).reshape(height, width)
+
+
 @displayed(lambda p: f"{p.name}, {'flat' if p.is_flat else p.cavity}")
 @dataclass(frozen=True)
 class Pattern:
@@ -334,16 +343,24 @@ class Pattern:
     ----------
     name : str
         Name of the pattern.
-    cavity : "none", "circle", "square" or "rectangle"
-        Shape of the cavities; "none" for a flat sample.
+    cavity : str
+        Shape of the cavities: "circle", "square", "rectangle", "ellipse", "ridge", "chevron", "random" or "mask";
+        "none" for a flat sample.
     size_m : tuple of float, shape (2,), optional
-        Size of a cavity in m along x and y; the diameter twice for a circle.
+        Size of a cavity in m along x and y; the diameter twice for a circle, the width twice for ridges along y, the
+        width of an arm and the shift of its tip along x for a chevron, the mean lengths for a picture.
     pitch_m : tuple of float, shape (2,), optional
-        Distance in m from one cavity to the next along x and y.
+        Distance in m from one cavity to the next along x and y; the extent of a picture.
     staggered : bool
         Whether every other row is shifted by half a pitch in x.
     measured_area_fraction : float, optional
         Contact area over nominal area as measured, in place of that of the geometry.
+    feature : "hole" or "pillar"
+        Whether the shapes are cavities, or are what touches.
+    lattice : "rows" or "hexagonal"
+        Only for the name: a hexagonal lattice is one of staggered rows sqrt(3) / 2 apart.
+    picture, pixel_m : str and float, optional
+        Mask of "random" and "mask", and the side of its pixels in m.
 
     Examples
     --------
@@ -358,6 +375,10 @@ class Pattern:
     pitch_m: tuple[float, float] | None = None
     staggered: bool = False
     measured_area_fraction: float | None = None
+    feature: str = "hole"
+    lattice: str = "rows"
+    picture: str | None = None
+    pixel_m: float | None = None
 
     @property
     def area_fraction(self) -> float:
@@ -366,8 +387,20 @@ class Pattern:
             return self.measured_area_fraction
         if self.cavity == "none" or self.size_m is None or self.pitch_m is None:
             return 1.0
-        share = np.pi / 4 if self.cavity == "circle" else 1.0
-        return float(1.0 - share * self.size_m[0] * self.size_m[1] / (self.pitch_m[0] * self.pitch_m[1]))
+        if self.picture is not None:
+            return float(picture_mask(self.picture).mean())
+        share = np.pi / 4 if self.cavity in ("circle", "ellipse") else 1.0
+        if self.cavity in ("ridge", "chevron"):
+            covered = self.size_m[0] / self.pitch_m[0]
+        else:
+            covered = share * self.size_m[0] * self.size_m[1] / (self.pitch_m[0] * self.pitch_m[1])
+        return float(covered if self.feature == "pillar" else 1.0 - covered)
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the model takes its shapes as they are, blocks at their edges by the share of them that touches."""
+        own = self.cavity in ("ellipse", "ridge", "chevron", "random", "mask")
+        return own or self.feature == "pillar" or self.lattice == "hexagonal"
 
     @property
     def is_flat(self) -> bool:

@@ -11,6 +11,7 @@ from urllib.parse import quote
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from tribo.campaign.geometry import Making, faults_of_making, mean_chords_m, picture_from, random_picture
 from tribo.campaign.table import RAW, TABLES, TOML
 from tribo.errors import CampaignError, Problem, system_problem
 from tribo.files import write_new
@@ -23,7 +24,7 @@ from tribo.input_files import (
     nests_too_deeply,
     read_input,
 )
-from tribo.records import Pattern
+from tribo.records import Pattern, picture_mask
 from tribo.units import QUANTITIES, quantity_named
 from tribo.user_text import did_you_mean, is_control
 from tribo.zeroing import zero_choice
@@ -108,7 +109,17 @@ def _a_fraction(given: Any) -> Any:
 class PatternTable(_Strict):
     """[patterns.NAME]: geometry of one pattern, lengths in micrometre; one number is x and y alike."""
 
-    cavity: Literal["none", "circle", "square", "rectangle"]
+    cavity: Literal["none", "circle", "square", "rectangle", "ellipse", "ridge", "chevron", "random", "mask"]
+    feature: Literal["hole", "pillar"] = "hole"
+    lattice: Literal["square", "staggered", "hexagonal"] | None = None
+    mask: Line | None = None
+    um_per_pixel: Positive | None = None
+    fraction: Annotated[float, Field(gt=0, lt=1)] | None = None
+    correlation_um: Positive | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    smallest_feature_um: Positive | None = None
+    smallest_wall_um: Positive | None = None
+    mask_grid_um: Positive | None = None
     diameter_um: Positive | None = None
     size_um: Positive | list[Positive] | None = None
     pitch_um: Positive | list[Positive] | None = None
@@ -123,27 +134,57 @@ class PatternTable(_Strict):
     @property
     def pitch(self) -> tuple[float, float] | None:
         """(x, y) of the lattice in micrometre."""
-        return _pair(self.pitch_um)
+        pair = _pair(self.pitch_um)
+        if pair is not None and self.lattice == "hexagonal":
+            return pair[0], pair[0] * 3**0.5 / 2
+        return pair
 
-    def pattern(self, name: str) -> Pattern:
-        """The pattern in metre."""
+    @property
+    def making(self) -> Making:
+        """What can be made, in metre."""
+        limits = (self.smallest_feature_um, self.smallest_wall_um, self.mask_grid_um)
+        return Making(*((limit or 0.0) * _UM for limit in limits))
+
+    def pattern(self, name: str, folder: Path | None = None) -> Pattern:
+        """The pattern in metre; ``folder`` holds its picture. ValueError where that cannot be used or made."""
 
         def metres(pair: tuple[float, float] | None) -> tuple[float, float] | None:
             return None if pair is None else (pair[0] * _UM, pair[1] * _UM)
 
+        if self.cavity in ("mask", "random"):
+            if self.mask is not None:
+                text, pixel_m = picture_from((folder or Path()) / self.mask), (self.um_per_pixel or 1.0) * _UM
+            else:
+                correlation_m = (self.correlation_um or 1.0) * _UM
+                text, pixel_m = random_picture(self.fraction or 0.5, correlation_m, self.seed)
+            mask = picture_mask(text)
+            found = Pattern(
+                name, self.cavity, mean_chords_m(mask, pixel_m), (mask.shape[1] * pixel_m, mask.shape[0] * pixel_m),
+                measured_area_fraction=self.area_fraction, picture=text, pixel_m=pixel_m,
+            )  # fmt: skip
+            if faults := list(faults_of_making(found, self.making)):
+                raise ValueError("; ".join(faults))
+            return found
         return Pattern(
             name=name,
             cavity=self.cavity,
             size_m=metres(self.size),
             pitch_m=metres(self.pitch),
-            staggered=self.staggered,
+            staggered=self.staggered or self.lattice in ("staggered", "hexagonal"),
             measured_area_fraction=self.area_fraction,
+            feature=self.feature,
+            lattice="hexagonal" if self.lattice == "hexagonal" else "rows",
         )
 
     @model_validator(mode="after")
     def _keys_fit_the_cavity(self) -> PatternTable:
-        wanted = {"none": (), "circle": ("diameter_um", "pitch_um")}.get(self.cavity, ("size_um", "pitch_um"))
-        given = [key for key in ("diameter_um", "size_um", "pitch_um") if getattr(self, key) is not None]
+        own: dict[str, tuple[str, ...]] = {
+            "none": (), "circle": ("diameter_um", "pitch_um"), "mask": ("mask", "um_per_pixel"),
+            "random": ("fraction", "correlation_um"),
+        }  # fmt: skip
+        wanted = own.get(self.cavity, ("size_um", "pitch_um"))
+        lengths = ("diameter_um", "size_um", "pitch_um", "mask", "um_per_pixel", "fraction", "correlation_um")
+        given = [key for key in lengths if getattr(self, key) is not None]
         missing = [key for key in wanted if key not in given]
         unused = [key for key in given if key not in wanted]
         if missing:
@@ -154,14 +195,18 @@ class PatternTable(_Strict):
 
     @model_validator(mode="after")
     def _cavities_stand_apart(self) -> PatternTable:
-        if self.cavity == "none":
+        if self.cavity in ("none", "mask", "random"):
             return self
         if self.size is None or self.pitch is None:
             raise ValueError("size_um and pitch_um must be one number or [x, y]")
         if self.cavity == "square" and self.size[0] != self.size[1]:
             raise ValueError("a square has one size_um; for two sizes use cavity = rectangle")
-        if self.size[0] >= self.pitch[0] or self.size[1] >= self.pitch[1]:
+        pattern = self.pattern("")
+        if not pattern.is_drawn and (self.size[0] >= self.pitch[0] or self.size[1] >= self.pitch[1]):
             raise ValueError("the pitch must be larger than the cavity; otherwise cavities touch")
+        limited = self.making != Making()
+        if (pattern.is_drawn or limited) and (faults := list(faults_of_making(pattern, self.making))):
+            raise ValueError("; ".join(faults))
         return self
 
 

@@ -107,7 +107,14 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         rows = read_tests(root, problems)
     if described is None or rows is None:
         raise CampaignError(problems)
-    patterns = {name: table.pattern(name) for name, table in described.patterns.items()}
+    patterns = {}
+    for name, table in described.patterns.items():
+        try:
+            patterns[name] = table.pattern(name, root)
+        except (OSError, ValueError) as why:
+            problems.append(Problem("mask", str(why), file=TOML, column=f"patterns.{name}", found=table.mask))
+    if len(patterns) < len(described.patterns):
+        raise CampaignError(problems)
     order = order_of(row.cells.get("started_at", "") for row in rows)
     by_file = {key: value for key, value in described.columns.items() if isinstance(value, dict)}
     stated = [*described.columns, *(key for columns in by_file.values() for key in columns)]

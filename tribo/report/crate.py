@@ -65,11 +65,12 @@ def _geometry(pattern: Pattern) -> str:
     if pattern.cavity == "none" or pattern.size_m is None or pattern.pitch_m is None:
         return "flat"
     size, pitch = ([v * 1e6 for v in pair] for pair in (pattern.size_m, pattern.pitch_m))
-    sides = size[:1] if pattern.cavity in ("circle", "square") else size
+    sides = size[:1] if pattern.cavity in ("circle", "square", "ridge") else size
     steps = pitch[:1] if pitch[0] == pitch[1] else pitch
-    shape = f"{pattern.cavity} {' × '.join(f'{v:g}' for v in sides)} µm"
+    shape = f"{pattern.cavity} {' × '.join(f'{v:.4g}' for v in sides)} µm"
+    shape = f"pillars, {shape}" if pattern.feature == "pillar" else shape
     staggered = ", staggered" if pattern.staggered else ""
-    return f"{shape}, pitch {' × '.join(f'{v:g}' for v in steps)} µm{staggered}, AF = {pattern.area_fraction:.3f}"
+    return f"{shape}, pitch {' × '.join(f'{v:.4g}' for v in steps)} µm{staggered}, AF = {pattern.area_fraction:.3f}"
 
 
 SLED = "sled"

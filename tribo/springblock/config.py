@@ -7,6 +7,7 @@ silent; "berardo2019" is the set that comes closest to the simulated column of i
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -18,6 +19,7 @@ from tribo.input_files import LARGEST_NUMBER, MOST_BLOCKS, MOST_STEPS, SMALLEST_
 from tribo.records import Pattern
 from tribo.springblock.engines import ENGINES, engines_with
 from tribo.springblock.lattice import STIFFEST, contact_mask, pattern_of
+from tribo.springblock.shapes import touching_share
 
 
 @displayed()
@@ -151,7 +153,8 @@ class SimConfig:
     normal_force
         "redistributed": contact blocks carry p l2 / AF and cavities nothing; "uniform": p l2 on every block.
     edges, pattern_first, cavity_shape
-        Free or periodic edges, first block of the first cavity, and whether circles become squares.
+        Free or periodic edges, first block of the first cavity, and whether circles become squares. "exact", as for
+        shapes and lattices that the paper does not have: a block that touches in part has that part of friction.
     rotation
         "small" for linearised springs, "finite" for the full r_ij of the paper (engine reference; the peaks differ
         by under 0.5 %).
@@ -208,7 +211,7 @@ class SimConfig:
     normal_force: NormalForce = "redistributed"
     edges: Edges = "free"
     pattern_first: tuple[int, int] | None = None
-    cavity_shape: Literal["square", "round"] = "square"
+    cavity_shape: Literal["square", "round", "exact"] = "square"
     rotation: Rotation = "small"
     engine: str = "fast"
     dt_s: float = 5e-8
@@ -303,6 +306,10 @@ class SimConfig:
         if pattern.size_m is not None and pattern.pitch_m is not None:
             flat |= {"cavity_size_m": pattern.size_m, "cavity_pitch_m": pattern.pitch_m}
             flat["cavity_staggered"] = pattern.staggered
+        if pattern.is_drawn:
+            flat |= {"feature": pattern.feature, "pattern_lattice": pattern.lattice}
+        if pattern.picture is not None:
+            flat["picture"] = hashlib.sha256(pattern.picture.encode()).hexdigest()[:16]
         flat["thickness_m"] = self.layer_m
         return flat
 
@@ -325,7 +332,7 @@ _BEYOND_THE_PEAK = {"duration_peaks", "window_start_peaks", "window_end_peaks"}
 _CHOICES: dict[str, tuple[str, ...]] = {
     "normal_force": ("redistributed", "uniform"),
     "edges": ("free", "periodic"),
-    "cavity_shape": ("square", "round"),
+    "cavity_shape": ("square", "round", "exact"),
     "rotation": ("small", "finite"),
     "peak_rule": ("highest", "first"),
     "block_mass": ("layer", "cube"),
@@ -455,9 +462,15 @@ def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
     if pattern.size_m is None or pattern.pitch_m is None:
         yield Problem("no_geometry", "size or pitch of the cavities is missing", column="pattern", found=pattern.name)
         return
+    if pattern.picture is not None:
+        if config.edges == "periodic":
+            yield from _periodic_problems(config, pattern)
+        return
     domain = (nx * config.spacing_m, ny * config.spacing_m)
     for axis, size, pitch, width in zip("xy", pattern.size_m, pattern.pitch_m, domain, strict=True):
-        if not (0 < size < pitch):
+        if pattern.cavity in ("ridge", "chevron") and axis == "y":
+            continue
+        if not (0 < size < pitch) and not pattern.is_drawn:
             yield Problem(
                 "impossible_geometry", f"the cavities are too large for their pitch along {axis}", column="pattern",
                 found=f"{size * 1e6:g} um in {pitch * 1e6:g} um", allowed="0 < size < pitch",
@@ -479,7 +492,8 @@ def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
 def _periodic_problems(config: SimConfig, pattern: Pattern) -> Iterator[Problem]:
     """Under periodic edges a whole number of pitches must fit (two rows of a staggered pattern)."""
     assert pattern.pitch_m is not None
-    repeat = (pattern.pitch_m[0], pattern.pitch_m[1] * (2 if pattern.staggered else 1))
+    rows = 1 if pattern.cavity == "ridge" else pattern.pitch_m[1] * (2 if pattern.staggered else 1) / config.spacing_m
+    repeat = (pattern.pitch_m[0], rows * config.spacing_m)
     for axis, blocks, length in zip("xy", config.blocks, repeat, strict=True):
         periods = blocks * config.spacing_m / length
         if abs(periods - round(periods)) > 1e-6:
@@ -491,7 +505,10 @@ def _periodic_problems(config: SimConfig, pattern: Pattern) -> Iterator[Problem]
 
 
 def mask_of(config: SimConfig) -> Any:
-    """Contact mask of a configuration, shape (ny, nx), True where a block touches the counterface."""
+    """Contact mask of a configuration, shape (ny, nx), True where a block touches; its share where it does in part."""
+    drawn = config.cavities.is_drawn or (config.cavity_shape == "exact" and not config.cavities.is_flat)
+    if drawn:
+        return touching_share(config.cavities, config.blocks, config.spacing_m, config.pattern_first)
     return contact_mask(
         config.cavities, config.blocks, config.spacing_m, config.pattern_first, config.cavity_shape
     )

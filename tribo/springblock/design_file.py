@@ -115,7 +115,12 @@ def runs_of_design(table: Mapping[str, Any], file: str | None = None) -> list[Si
     axes = _axes(design.parameters, problems)
     if too_many := _too_many(design, axes):
         raise SimulationError([p.at(file=file) for p in (*problems, too_many)])
-    patterns = {name: p.pattern(name) for name, p in design.patterns.items()}
+    patterns = {}
+    for name, described in design.patterns.items():
+        try:
+            patterns[name] = described.pattern(name, Path(file).parent if file else None)
+        except (OSError, ValueError) as why:
+            raise SimulationError(Problem("mask", str(why), file=file, column=f"patterns.{name}")) from why
     runs = [
         run
         for combination in product(*axes.values())

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 INPUTS = {"sample": "1", "pressure_Pa": "Pa", "angle_deg": "degree", "seed": "1"}
 OF_THE_SAMPLE = {"pattern", "cavity", "cavity_size_m", "cavity_pitch_m", "cavity_staggered"}
+OF_THE_SAMPLE |= {"feature", "pattern_lattice", "picture"}
 DONE = "done"
 WRITE_EVERY_S = 2.0
 UNREADABLE = (OSError, KeyError, ValueError, TypeError, RuntimeError, MemoryError, AttributeError, IndexError)

@@ -139,10 +139,11 @@ class Lattice:
     follow: FloatArray  # (n + 1, 2, 2)
     lag: FloatArray  # (n + 1, 2, 2)
     bond: FloatArray | None = None  # (n,) zero on cavities
+    touching: FloatArray | None = None  # (n,) share of each block that touches; None where it is all or nothing
 
     @property
     def area_fraction(self) -> float:
-        return float(self.contact.mean())
+        return float(self.contact.mean() if self.touching is None else self.touching.mean())
 
     def spring_forces(self, displacement: FloatArray) -> FloatArray:
         """Elastic force on every block per unit K_int, springs to neighbours and own stiffness; (n, 2)."""
@@ -158,18 +159,21 @@ class Lattice:
         return np.asarray(force[:-1])
 
 
-def make_lattice(mask: BoolArray, shear: float, periodic: bool, bond: float | None = None) -> Lattice:
-    """Lattice of a contact mask (ny, nx); ``shear`` is K_s / K_int, ``bond`` the stiffness of contact, None if rigid.
+def make_lattice(
+    mask: BoolArray | FloatArray, shear: float, periodic: bool, bond: float | None = None
+) -> Lattice:
+    """Lattice of a contact mask (ny, nx), or of the share of each block that touches.
 
-    One factorisation a mask, kept for later.
+    ``shear`` is K_s / K_int, ``bond`` the stiffness of contact, None if rigid. One factorisation a mask is kept.
     """
-    packed = np.packbits(mask).tobytes()
-    return _make_lattice(packed, mask.shape, shear, periodic, bond)
+    shares = b"" if mask.dtype == bool else mask.tobytes()
+    packed = np.packbits(mask > 0).tobytes()
+    return _make_lattice(packed, mask.shape, shear, periodic, bond, shares)
 
 
 @lru_cache(maxsize=16)
 def _make_lattice(
-    packed: bytes, shape: tuple[int, int], shear: float, periodic: bool, stiffness: float | None
+    packed: bytes, shape: tuple[int, int], shear: float, periodic: bool, stiffness: float | None, shares: bytes
 ) -> Lattice:
     ny, nx = shape
     n = nx * ny
@@ -179,14 +183,15 @@ def _make_lattice(
     for k, spring in enumerate(SPRINGS):
         own[:n] += np.where(neighbours[:n, k, None] < n, spring, 0.0)
     own[:n, :2] += shear
-    bond = None if stiffness is None else np.where(contact, stiffness, 0.0)
+    touching = np.frombuffer(shares) if shares else None
+    bond = None if stiffness is None else np.where(contact, stiffness, 0.0) * (1.0 if touching is None else touching)
     if bond is None:
         follow, lag = _condense(np.flatnonzero(~contact), neighbours, own, shear)
     else:
         held = own.copy()
         held[:n, :2] += bond[:, None]
         follow, lag = _condense(np.arange(n), neighbours, held, shear)
-    return Lattice(nx, ny, periodic, shear, contact, neighbours, own, follow, lag, bond)
+    return Lattice(nx, ny, periodic, shear, contact, neighbours, own, follow, lag, bond, touching)
 
 
 def _neighbours(nx: int, ny: int, periodic: bool) -> NDArray[np.int64]:

@@ -80,6 +80,7 @@ def thresholds_of(config: SimConfig, lattice: Lattice) -> Thresholds:
 
     def force(mean: float, sd: float, draw: FloatArray, adhesion_Pa: float) -> FloatArray:
         total = np.maximum(mean + sd * draw, 0.0) * normal + adhesion_Pa * area
+        total = total if lattice.touching is None else total * lattice.touching
         return np.where(lattice.contact, np.maximum(total, 0.0), 0.0)
 
     holding = force(f.mu_s, f.mu_s_sd, static, f.static_adhesion_Pa)
