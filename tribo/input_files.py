@@ -11,14 +11,16 @@ or overwrite each other on some system.
 
 from __future__ import annotations
 
-import datetime
 import errno
 import io
+import json
 import mmap
 import os
 import re
 import stat
 import struct
+import subprocess
+import sys
 import unicodedata
 import zipfile
 import zlib
@@ -28,9 +30,11 @@ from contextvars import ContextVar
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
+from xml.parsers import expat
 
 from tribo.errors import CampaignError, Problem, ReadError, naming
+from tribo.workbook_sheets import MOST_MEMORY_BYTES
 
 # Files
 LARGEST_EXPORT_BYTES = 2 << 30
@@ -59,6 +63,7 @@ MOST_UNPACKED_EXPORT_BYTES = 400_000_000  # of an export in a .zip or .gz, which
 MOST_EXPANSION = 200  # text of numbers shrinks about three- to tenfold
 SMALL_ENTRY_BYTES = 10_000_000  # below this no expansion is a danger
 MOST_WORKBOOK_BYTES = 200_000_000  # an Excel export, unpacked
+LONGEST_WORKBOOK_S = 120.0  # of reading it
 LONGEST_ENTRY_NAME_BYTES = 1_000
 LONGEST_PATH_PART_BYTES = 255  # on all common file systems
 DEEPEST_PATH = 32
@@ -80,7 +85,7 @@ MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that m
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 ZIP = b"PK\x03\x04"
 _MOST_CELLS = 20_000_000  # of the rectangle that a sheet spans, filled or not: its reader keeps all of them
-_CELL = re.compile(rb'<c [^>]*?r="([A-Z]{1,3})(\d{1,7})"')
+_PLACE = re.compile(r"([A-Za-z]{1,3})(\d{1,7})")
 _MOST_NAMED = 5
 _CHUNK = 1 << 20
 _NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error)
@@ -377,13 +382,9 @@ def sheets_as_text(data: bytes, file: str) -> dict[str, str]:
     try:
         if data[:4] == ZIP:
             _refuse_large(data, file)
-        sheets = _sheets(data)
-    except ReadError:
-        raise
-    except BaseException as why:
-        if not isinstance(why, Exception) and type(why).__name__ != "PanicException":  # of Rust, on damaged files
-            raise
+    except (*_NOT_A_ZIP, expat.ExpatError) as why:
         raise ReadError(Problem("bad_workbook", f"not a readable workbook ({why})", file=file)) from None
+    sheets = _sheets(data, file)
     texts = {name: text for name, text in sheets.items() if text.strip()}
     if not texts:
         raise ReadError(Problem("empty", "the workbook contains no filled cells", file=file))
@@ -396,36 +397,62 @@ def _refuse_large(data: bytes, file: str) -> None:
         if problems := size_problems(entries, len(data), file, MOST_WORKBOOK_BYTES):
             raise ReadError(replace(problem, kind="too_large") for problem in problems)
         for entry in entries:
-            if entry.filename.startswith("xl/worksheets/") and entry.filename.endswith(".xml"):
-                cells = _spanned(packed.read(entry))
+            if entry.filename.lower().endswith(".xml"):
+                with packed.open(entry) as sheet:
+                    cells = _spanned(sheet)
                 if cells > _MOST_CELLS:
                     found, allowed = f"{cells} cells in {entry.filename}", f"at most {_MOST_CELLS}"
                     raise ReadError(Problem("too_large", "the file is too large", file, found=found, allowed=allowed))
 
 
-def _spanned(sheet: bytes) -> int:
-    """Cells of the rectangle from the first to the last cell of a sheet."""
-    found = {(letters, int(row)) for letters, row in _CELL.findall(sheet)}
-    rows = {row for _, row in found}
-    columns = {sum((letter - 64) * 26**k for k, letter in enumerate(reversed(letters))) for letters, _ in found}
-    return (max(rows) - min(rows) + 1) * (max(columns) - min(columns) + 1) if found else 0
+def _spanned(sheet: IO[bytes]) -> int:
+    """Cells of the rectangle from the first to the last cell of a worksheet; 0 of XML without cells.
+
+    A cell and a row may state their place or leave it to their order (ECMA-376-1, 18.3.1.4 and 18.3.1.73); tables of
+    OpenDocument repeat both by number (OpenDocument 1.3, 19.675 and 19.679).
+    """
+    rows: list[int] = []  # the first and the last so far, as the columns
+    columns: list[int] = []
+    row = column = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal row, column
+        name = tag.rpartition(" ")[2]
+        stated = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
+        if name == "row":
+            row, column = int(stated.get("r", row + 1)), 0
+        elif name == "table-row":
+            row, column = row + int(stated.get("number-rows-repeated", 1)), 0
+        elif name == "c":
+            place = _PLACE.fullmatch(stated.get("r", ""))
+            column += 1
+            if place:
+                row, column = int(place[2]), sum((ord(x) - 64) * 26**k for k, x in enumerate(place[1].upper()[::-1]))
+        elif name == "table-cell":
+            column += int(stated.get("number-columns-repeated", 1))
+        if name == "c" or (name == "table-cell" and "value-type" in stated):
+            rows[:] = [min([*rows, row]), max([*rows, row])]
+            columns[:] = [min([*columns, column]), max([*columns, column])]
+
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.StartElementHandler = start
+    parser.ParseFile(sheet)
+    return (rows[1] - rows[0] + 1) * (columns[1] - columns[0] + 1) if rows else 0
 
 
-def _sheets(data: bytes) -> dict[str, str]:
-    from python_calamine import CalamineWorkbook
-
-    book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+def _sheets(data: bytes, file: str) -> dict[str, str]:
+    """The text of every sheet, read by a process of its own with a limit of memory and of time."""
+    program = [sys.executable, "-P", str(Path(__file__).with_name("workbook_sheets.py"))]
     try:
-        sheets = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
-    finally:
-        book.close()
-    return {name: "\n".join("\t".join(map(_cell, row)) for row in rows) + "\n" for name, rows in sheets.items()}
-
-
-def _cell(value: object) -> str:
-    """A cell as text: whole numbers without a decimal point, dates as they are in tests.csv."""
-    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
-        return str(int(value))
-    if isinstance(value, datetime.datetime):
-        return value.isoformat(" ")
-    return " ".join(str(value).split())
+        done = subprocess.run(program, input=data, capture_output=True, timeout=LONGEST_WORKBOOK_S, check=False)
+    except subprocess.TimeoutExpired:
+        what, allowed = "reading the workbook takes too long", f"{LONGEST_WORKBOOK_S:g} s"
+        raise ReadError(Problem("too_large", what, file, allowed=f"{allowed}; save the sheet as .csv")) from None
+    said = done.stderr.decode("utf-8", errors="replace")
+    if done.returncode == 0:
+        return dict(json.loads(done.stdout))
+    if done.returncode < 0 or "memory" in said:
+        what, allowed = "reading the workbook takes too much memory", f"{MOST_MEMORY_BYTES / 1e9:g} GB"
+        raise ReadError(Problem("too_large", what, file, allowed=f"{allowed}; delete far cells, or save it as .csv"))
+    said = said.strip().rpartition("\n")[2]
+    raise ReadError(Problem("bad_workbook", f"not a readable workbook ({said})", file=file))
