@@ -11,7 +11,11 @@ from typing import Any
 import pytest
 
 import tribo
+from tribo import stages
+from tribo.campaign import load_campaign
 from tribo.cli import main
+from tribo.errors import Problem, SimulationError
+from tribo.records import Study
 
 MODULES = {"plot"}
 
@@ -81,3 +85,14 @@ def test_the_fifteen_lines_of_the_tutorial_run_as_written_and_give_what_the_repo
     assert len(said["pulls"]) == 144
     assert set(said["residuals"]["regime"]) == {"static", "sliding"}
     assert said["run"].static_friction > said["run"].sliding_friction > 0
+
+
+def test_a_law_that_the_model_cannot_run_with_leaves_the_fits_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: Any, **__: Any) -> Study:
+        raise SimulationError(Problem("too_short", "the run ends too early", column="duration_s"))
+
+    monkeypatch.setattr(stages, "compare", refused)
+    study = stages.study(load_campaign(tribo.data_dir() / "example"), until="compare")
+    assert study.comparison is None
+    assert len(study.fits) == 12
+    assert any("cannot be run with the friction law of the flat sample" in note for note in study.notes)

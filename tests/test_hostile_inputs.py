@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import HealthCheck, Phase, given, settings, strategies as st
 
 from tribo import stages
 from tribo.campaign import load_campaign
+from tribo.input_files import toml_table
 from tribo.records import Ingested
 
 QUICK = settings(
@@ -72,3 +74,21 @@ def test_the_bench_tells_a_comment_that_readers_of_zips_disagree_about() -> None
     campaign = hostile.zip_of([("tests.csv", b"", 0)], b"")
     for comment, readings in ((b"", 1), (b"a comment", 1), (hostile.END, 2), (b"PK", 1), (campaign, 2)):
         assert len(hostile.ends_of(hostile.zip_of([("tests.csv", b"", 0)], comment))) == readings
+
+
+@pytest.mark.parametrize(
+    "text",
+    [f"{'a.' * 40_000}a = 1", f"[{'a.' * 40_000}a]", f"x = {{{'a.' * 40_000}a = 1}}", f"{'a . ' * 60}b = 1",
+     '"a".' * 60 + "b = 1"],
+    ids=["key", "table", "inline", "blanks", "quoted"],
+)  # fmt: skip
+def test_keys_of_very_many_parts_are_refused_before_they_are_read(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tomllib, "loads", lambda _: pytest.fail("the text was read"))
+    with pytest.raises(RecursionError):
+        toml_table(text)
+
+
+def test_points_in_texts_comments_and_numbers_are_no_parts_of_keys() -> None:
+    dots = "a." * 100
+    text = f"x = '{dots}' # {dots}\ny = \"\"\"\n{dots}\"\"\"\nz = [1.5, 2.5]\nb.c.d = 2\n"
+    assert toml_table(text) == {"x": dots, "y": dots, "z": [1.5, 2.5], "b": {"c": {"d": 2}}}

@@ -21,6 +21,7 @@ import stat
 import struct
 import subprocess
 import sys
+import tomllib
 import unicodedata
 import zipfile
 import zlib
@@ -86,6 +87,12 @@ OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 ZIP = b"PK\x03\x04"
 _MOST_CELLS = 20_000_000  # of the rectangle that a sheet spans, filled or not: its reader keeps all of them
 _PLACE = re.compile(r"([A-Za-z]{1,3})(\d{1,7})")
+_QUOTED = re.compile(  # texts and comments of TOML
+    r'"""(?:[^"\\]|\\.|"(?!""))*+"""|' r"'''(?:[^']|'(?!''))*+'''|" r'"(?:[^"\\\n]|\\.)*+"|'
+    r"'[^'\n]*+'|#[^\n]*+",
+    re.DOTALL,
+)
+_KEYS = re.compile(r"[^=\[\]{},\n]++")
 _MOST_NAMED = 5
 _CHUNK = 1 << 20
 _NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error)
@@ -167,6 +174,23 @@ def nests_too_deeply(parsed: Any) -> bool:
             return False
         level = below
     return True
+
+
+def toml_table(text: str) -> dict[str, Any]:
+    """A TOML text as a table; keys of more than DEEPEST_NESTING parts, whose reading takes a time of their square, are
+    refused before they are read.
+
+    Raises
+    ------
+    RecursionError
+        Tables or arrays nested too deeply.
+    ValueError
+        It is not TOML.
+    """
+    bare = _QUOTED.sub("q", text)
+    if any(run[0].count(".") >= DEEPEST_NESTING for run in _KEYS.finditer(bare)):
+        raise RecursionError
+    return tomllib.loads(text)
 
 
 @contextmanager

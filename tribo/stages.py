@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tribo.cache.kept_results import kept_or_made
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
 from tribo.display import displayed
-from tribo.errors import FitError
+from tribo.errors import FitError, SimulationError
 from tribo.records import (
     Campaign,
     Fits,
@@ -339,7 +339,13 @@ def study(
         if until == "fit" or without:
             fitted = Study(ingested, fits, notes=tuple(filter(None, (without, no_law))))
         else:
-            fitted = compare(ingested, fits, options, progress=progress)
+            try:
+                fitted = compare(ingested, fits, options, progress=progress)
+            except SimulationError as why:
+                if any(problem.file or problem.column == "scheduler" for problem in why.problems):
+                    raise  # of a file or a cluster, not of the law of the flat sample
+                without = f"The spring-block model cannot be run with the friction law of the flat sample: {why}."
+                fitted = Study(ingested, fits, notes=(without,))
         return assess(with_doubts(fitted), options)
 
 

@@ -133,7 +133,7 @@ def _steps_in_order(
 
 
 def _steps(name: str, campaign: dict[str, Any], options: dict[str, str]) -> list[tuple[str, str]]:
-    where = f"{shlex.quote(campaign['path'])} -o ../current/{shlex.quote(name)}"
+    where = f"{shlex.quote(campaign['path'])} -o ../current/{shlex.quote(campaign['name'])}"
     return [
         ("predict", f"predict --jobs 1 {where} {options['model']}"),
         ("report", f"report --jobs 1 {where} {options['model']}"),
@@ -143,7 +143,7 @@ def _steps(name: str, campaign: dict[str, Any], options: dict[str, str]) -> list
 def _arguments(state: Path, name: str, step: str, words: str, described: dict[str, Any]) -> list[str]:
     """What one step is started with; nothing where its record says that it has been run on the same."""
     campaign = described["ready"][name]
-    digest = f"{campaign['digest']} {described['sources']} {described['options']['words']}"
+    digest = campaign["digest"]
     if _is_done(state / "steps" / name / f"{step}.json", digest):
         return []
     files = ["--files", campaign["files"]] if step == "report" else []

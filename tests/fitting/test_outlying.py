@@ -106,3 +106,13 @@ def test_a_cell_of_repeats_counts_unless_chance_gives_its_scatter_less_than_once
     assert found[2] == 2 * cells
     variance = 1 / weights_by_repeats(np.array([10.0]), found)
     assert variance[0] == pytest.approx(1.0 if cells == 40 else 44 / 41, rel=1e-3)
+
+
+def test_repeats_that_are_equal_but_for_one_cell_have_a_scatter_that_is_a_number() -> None:
+    rows = [("A", f"A{k}", 1.0, 5.0) for k in range(30) for _ in range(2)]
+    rows += [("A", "A30", 1.0, 4.0), ("A", "A30", 1.0, 6.0)]
+    table = pd.DataFrame(rows, columns=["sample", "specimen", "normal_load_N", "static_N"])
+    found = repeat_scatter(sample_rows(table, "static"))
+    assert found is not None
+    assert np.isfinite(found).all()
+    assert np.isfinite(weights_by_repeats(np.array([5.0]), found)).all()

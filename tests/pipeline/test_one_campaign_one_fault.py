@@ -21,10 +21,13 @@ from tribo.site.build import BuildOptions, _configuration
 from tribo.site.history import CampaignRow, history
 from tribo.site.index_page import change_points, page, series, trend_csv, write_index
 from tribo.site.scan import scan
-from tribo.site.steps import Step, inputs_of, note
+from tribo.site.steps import Step, id_of, inputs_of, note
 
-BAD_NAMES = (b"a{b}c", b"x" * 250, b"not-\xff-utf8", b"index.html", b"trend.csv", b"esc\x1b[31m", b"back\\slash")
-GOOD_NAMES = ("plain", "with space", "ümlaut", "-dash", "a'b\"c", "$HOME", "A|B", "100%")
+BAD_NAMES = (b"x" * 250, b"not-\xff-utf8", b"index.html", b"trend.csv", b"esc\x1b[31m", b"back\\slash")
+GOOD_NAMES = (
+    "a{b}c", "PDMS <new>", "<results>", "ab" * 30, "=", "plain", "with space", "ümlaut", "-dash", "a'b\"c",
+    "$HOME", "A|B", "100%",
+)  # fmt: skip
 
 
 def drop_of(folder: Path, *names: str | bytes) -> Path:
@@ -50,6 +53,14 @@ def test_a_name_that_cannot_be_used_is_refused_with_its_reason_and_the_others_ar
     for campaign in refused:
         assert "rename it" in campaign.refused[0]
         campaign.name.encode()
+
+
+def test_the_workflow_knows_each_campaign_by_a_plain_name_of_its_own() -> None:
+    ids = [id_of(name) for name in GOOD_NAMES]
+    assert len(set(ids)) == len(GOOD_NAMES)
+    assert all(re.fullmatch(r"=?[A-Za-z0-9][A-Za-z0-9_.-]{0,60}", name) for name in ids)
+    assert id_of("plain") == "plain"
+    assert not re.search(r"(.+)\1{9}", id_of("ab" * 30))
 
 
 def test_a_file_of_a_name_that_is_not_utf8_is_listed_and_hashed(tmp_path: Path) -> None:

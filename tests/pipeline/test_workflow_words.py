@@ -42,7 +42,7 @@ def written(folder: Path) -> Path:
     stand_in.chmod(0o755)
     ready = {
         name: {
-            "path": f"/drop/{name}", "digest": f"d {name} s {shlex.join(['--flat', ODD])}",
+            "name": name, "path": f"/drop/{name}", "digest": f"d {name} s {shlex.join(['--flat', ODD])}",
             "samples": [], "cells": [name], "files": f"inputs/{name}.json",
             "overrides": shlex.join(["--overrides", f"/drop/{name}{ODD}"]),
         }

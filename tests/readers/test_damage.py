@@ -160,6 +160,23 @@ def test_repeated_times_are_read_and_flagged(path: Path) -> None:
     assert "time_repeats" in read_export(path).flags
 
 
+def test_rows_of_a_clock_in_whole_seconds_are_spread_over_each_second(path: Path) -> None:
+    rows = [[f"{k // 4}", f"{0.1 * k:.3f}", f"{0.01 * k:.4f}"] for k in range(40)]
+    path.write_bytes(written(rows, NAMES, UNITS))
+    trace = read_export(path)
+    assert "coarse_clock" in trace.flags
+    np.testing.assert_allclose(trace.time_s, 0.25 * np.arange(40))
+
+
+def test_rows_that_are_there_twice_keep_the_times_of_the_record(path: Path) -> None:
+    rows = [row for row in ramp() for _ in (1, 2)]
+    once = [float(row[0]) for row in ramp()]
+    path.write_bytes(written(rows, NAMES, UNITS))
+    trace = read_export(path)
+    assert "coarse_clock" in trace.flags
+    np.testing.assert_allclose(trace.time_s[::2], once)
+
+
 @pytest.mark.parametrize("number", ["1.234,5", "1,234.5", "1.2.3"])
 def test_two_decimal_marks_in_a_number_are_named(path: Path, number: str) -> None:
     rows = ramp()

@@ -23,6 +23,7 @@ from tribo.input_files import (
     SMALLEST_NUMBER,
     nests_too_deeply,
     read_input,
+    toml_table,
 )
 from tribo.records import Pattern, picture_mask
 from tribo.units import QUANTITIES, quantity_named
@@ -280,7 +281,7 @@ def read_description(path: Path, file: str, problems: list[Problem]) -> Campaign
     deep = Problem("too_deep", "tables and arrays nested too deeply", file, allowed=f"at most {DEEPEST_NESTING} levels")
     try:
         text = read_input(path, LARGEST_DESCRIPTION_BYTES).decode("utf-8-sig")
-        table = tomllib.loads(text)
+        table = toml_table(text)
         if not nests_too_deeply(table):
             return CampaignFile.model_validate(table)
         problems.append(deep)

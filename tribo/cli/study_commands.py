@@ -320,7 +320,7 @@ def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagno
     """With the spring-block model, or, where a study was made without it, without."""
     from tribo.stages import diagnose as diagnosis_with_model, diagnosis_without_model, without_model
 
-    if without_model(study.ingested.campaign, chosen):
+    if study.comparison is None or without_model(study.ingested.campaign, chosen):
         return diagnosis_without_model(study, seed=chosen.seed, kept=chosen.kept)
     return diagnosis_with_model(
         study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress

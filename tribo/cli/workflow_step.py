@@ -30,7 +30,8 @@ def run_step(
     record: Path, command: Sequence[str], digest: str, after: Sequence[Path] = (), files: Path | None = None
 ) -> int:
     """Run a tribo command as a step, write its record and note both in the journal; returns the exit status."""
-    step, state = Step.of_record(record), record.parents[2]
+    out = Path(command[command.index("-o") + 1]) if "-o" in command else record.parent
+    step, state = Step(record.stem, out.name), record.parents[2]
     return noted(state, step, lambda: _recorded(record, command, digest, after, files))
 
 

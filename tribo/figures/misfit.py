@@ -234,7 +234,9 @@ def _trace_cells(d: Diagnosis, columns: list[Covariate]) -> list[dict[str, Any]]
         good = np.isfinite(values)
         for column in columns:
             x = column.score[good]
-            if column.name in ("mean", "normal_load_N", BEND) or good.sum() < 12 or np.ptp(x) <= 1e-9:
+            if column.name in ("mean", "normal_load_N", BEND) or good.sum() < 12:
+                continue
+            if min(np.ptp(x), np.ptp(values[good])) <= 1e-9:
                 continue
             rho, p = spearmanr(x, values[good])
             slope = np.polyfit(x, values[good], 1)[0]

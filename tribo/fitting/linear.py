@@ -198,6 +198,8 @@ def repeat_scatter(samples: tuple[Rows, ...]) -> tuple[float, float, int] | None
     for _ in range(_ROUNDS_OF_SCATTER):
         expected = terms[0] + terms[1] * mean**2
         keep = variance <= limit * expected
+        if not variance[keep].any():  # equal repeats but for the cells that scatter too much
+            break
         terms = _not_negative(mean[keep] ** 2, variance[keep], dof[keep] / expected[keep] ** 2)
     return float(np.sqrt(terms[0])), float(np.sqrt(terms[1])), int(dof[keep].sum())
 

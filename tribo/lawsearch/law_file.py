@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from tribo.diagnostics.verdict import Estimate
 from tribo.errors import CampaignError, Problem
 from tribo.files import text_of
+from tribo.input_files import toml_table
 from tribo.lawsearch.grammar import ADHESION_TERM, AMPLITUDES, BOTH, LOAD_TERM, MOST_VALUES, Shape, T, WrittenLaw
 
 SCHEMA = "tribo.law/1"
@@ -122,9 +123,11 @@ def read_law(path: Path) -> KnownLaw:
         The file is no law, with every fault of it.
     """
     try:
-        table = LawTable.model_validate(tomllib.loads(text_of(path)))
+        table = LawTable.model_validate(toml_table(text_of(path)))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
         raise CampaignError(Problem("bad_toml", f"not a TOML file: {why}", file=path.name)) from None
+    except RecursionError:
+        raise CampaignError(Problem("bad_toml", "tables nested too deeply", file=path.name)) from None
     except ValidationError as why:
         raise CampaignError(
             Problem("bad_law", e["msg"], file=path.name, column=".".join(map(str, e["loc"]))) for e in why.errors()

@@ -166,6 +166,26 @@ def beyond_measurement(
     return problems
 
 
+def spread_over_ticks(
+    time: FloatArray, file: str, column: str, row_of: RowOf
+) -> tuple[FloatArray, list[Problem]]:
+    """The time (s) of each row where the clock ticks slower than rows come: the rows of a tick evenly over it.
+
+    A time base of which less than half the rows repeat the time of the row before is left as it is, to the bit. Returns
+    the time and, where it was changed, a doubt that says so.
+    """
+    step = np.diff(time)
+    if step.size < 2 or step.min() < 0 or np.median(step) > 0 or not step.any():
+        return time, []
+    first = np.concatenate([[0], np.flatnonzero(step > 0) + 1])
+    ticks, rows = time[first], np.diff([*first, time.size])
+    last = ticks[-1] + float(np.median(np.diff(ticks))) * rows[-1] / np.median(rows)
+    spread = np.interp(np.arange(time.size), [*first, time.size], [*ticks, last])
+    what = "most rows repeat the time of the row before: the rows of each time were spread evenly up to the next one"
+    found = f"{rows.max()} rows at {ticks[np.argmax(rows)]:.6g} s"
+    return spread, [Problem("coarse_clock", what, file, row_of(int(first[0]) + 1), column, found, "a finer clock")]
+
+
 def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[Problem]:
     """Faults of a time base: decreasing, repeated or missing times. ``row_of(k)`` is the line of sample k."""
     if time.size < 2:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
-from tribo.input_files import read_input
+from tribo.input_files import read_input, toml_table
 from tribo.readers.columns import Given, bare_unit, is_unit, match_column
 from tribo.readers.source import HEAD_BYTES, LARGEST_HEAD_BYTES, Source
 
@@ -379,7 +378,7 @@ def _names_beside(path: Path) -> Iterator[tuple[tuple[str, ...], str]]:
             listed: object = []
             try:
                 if beside.suffix == ".toml":
-                    listed = tomllib.loads(text).get("columns", [])
+                    listed = toml_table(text).get("columns", [])
                 elif beside.suffix == ".json":
                     stored = json.loads(text)
                     listed = stored.get("columns", []) if isinstance(stored, dict) else stored

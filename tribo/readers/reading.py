@@ -13,7 +13,15 @@ import numpy as np
 from tribo.errors import Problem, ReadError
 from tribo.input_files import OLD_EXCEL, ZIP, sheets_as_text
 from tribo.readers.binary_machines import BINARY_MACHINES
-from tribo.readers.checks import NO_TIME, Arrays, beyond_measurement, check_scale, check_time, complete
+from tribo.readers.checks import (
+    NO_TIME,
+    Arrays,
+    beyond_measurement,
+    check_scale,
+    check_time,
+    complete,
+    spread_over_ticks,
+)
 from tribo.readers.columns import (
     ACCEPTABLE,
     ROWS_LEFT_OUT,
@@ -354,7 +362,8 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
         return why
     if impossible:
         return ReadError(impossible)
-    findings = check_time(arrays["time"], source.file, labels["time"], row_of)
+    arrays["time"], coarse = spread_over_ticks(arrays["time"], source.file, labels["time"], row_of)
+    findings = coarse + check_time(arrays["time"], source.file, labels["time"], row_of)
     load = arrays.get("normal force")
     load_varies = load is not None and bool(np.ptp(load) > 0.5 * np.abs(load).max())
     for quantity in ("displacement",) if load_varies else ("friction force", "displacement"):

@@ -25,7 +25,7 @@ from tribo.errors import Problem, TriboError
 from tribo.files import found_below, found_in, text_of, write_text
 from tribo.site.history import collect_laws
 from tribo.site.scan import CURRENT, Dropped, clear_unfinished, date_build, difference, scan
-from tribo.site.steps import INDEX, JOURNAL, OF_A_REPORT, Step, due_steps, inputs_of, journal, read_record
+from tribo.site.steps import INDEX, JOURNAL, OF_A_REPORT, Step, due_steps, id_of, inputs_of, journal, read_record
 from tribo.site.workflow import Progress, run_workflow
 from tribo.stages import StudyOptions
 from tribo.temporary import PREFIX, clear_abandoned, place_of_temporary_files
@@ -253,9 +253,9 @@ def _profile_folder(profile: str) -> Path:
 
 def _why_due(campaign: Dropped, state: Path, digest: str) -> str:
     """Why a campaign is to be built, in words; empty where its report is of exactly these files and options."""
-    record = read_record(state / "steps" / campaign.name / "report.json", *OF_A_REPORT, "files")
+    record = read_record(state / "steps" / id_of(campaign.name) / "report.json", *OF_A_REPORT, "files")
     if record is None:
-        started = (state / "steps" / campaign.name).is_dir()
+        started = (state / "steps" / id_of(campaign.name)).is_dir()
         return "not finished in an earlier build" if started else "new"
     changed = difference(record["files"], campaign.files)
     if changed:
@@ -269,7 +269,7 @@ def _forced(due: Mapping[str, str], state: Path) -> tuple[str, ...]:
     """Reports that Snakemake would not miss: gone ones, and records lost behind an index that is there."""
     if not (state / "index.json").is_file():
         return ()
-    records = {name: f"steps/{name}/report.json" for name in due}
+    records = {name: f"steps/{id_of(name)}/report.json" for name in due}
     lost = [r for name, r in records.items() if due[name] == GONE or not (state / r).is_file()]
     return ("--forcerun", *lost) if lost else ()
 
@@ -282,7 +282,7 @@ def _configuration(found: Sequence[Dropped], ready: Mapping[str, Any], file: Pat
     }
     listing = json.dumps([campaigns, {n: r["digest"] for n, r in ready.items()}, options.made_with])
     config = {
-        "ready": ready,
+        "ready": {id_of(name): {**inputs, "name": name} for name, inputs in ready.items()},
         "campaigns": campaigns,
         "digest": hashlib.sha256(listing.encode()).hexdigest(),
         "options": options.of_commands(),
@@ -310,7 +310,7 @@ def _snakemake(
 
 
 def _status(name: str, state: Path) -> str:
-    record = read_record(state / "steps" / name / "report.json", *OF_A_REPORT)
+    record = read_record(state / "steps" / id_of(name) / "report.json", *OF_A_REPORT)
     return str(record["status"]) if record else "not built yet"
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from tribo.errors import failed_by_system, naming
 from tribo.files import found_below, found_in, text_of, write_text
-from tribo.site.steps import OF_A_REPORT, read_record
+from tribo.site.steps import OF_A_REPORT, id_of, read_record
 from tribo.user_text import for_spreadsheet, from_spreadsheet
 
 PARAMETERS = {
@@ -58,14 +58,18 @@ def history(site: Path) -> tuple[CampaignRow, ...]:
     state = site / ".tribo"
     config = json.loads(text_of(state / "build.json"))
     steps = state / "steps"
-    names = set(config["campaigns"]) | {p.parent.name for p in found_below(steps, "report.json")}
+    reported = {p.parent.name for p in found_below(steps, "report.json")}
+    current = site / "current"
+    folders = current.iterdir() if current.is_dir() else ()
+    named = (folder.name for folder in folders if id_of(folder.name) in reported)
+    names = set(config["campaigns"]) | set(named) | {name for name in reported if name == id_of(name)}
     rows = [_row(name, site, config) for name in names]
     return tuple(sorted(rows, key=lambda row: (row.measured_s, row.name)))
 
 
 def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
     out = site / "current" / name
-    record = read_record(site / ".tribo" / "steps" / name / "report.json", *OF_A_REPORT)
+    record = read_record(site / ".tribo" / "steps" / id_of(name) / "report.json", *OF_A_REPORT)
     state, why = _state(name, record, config)
     verdict, card = (read_record(out / f"{name}.json") or {} for name in ("verdict", "card"))
     step, tests = card.get("next_test"), _table(out / "tests.csv")
@@ -98,7 +102,7 @@ def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any
     waiting = config["campaigns"][name]["waiting"]
     if waiting:
         return "waiting", tuple(waiting)
-    if record is None or record["digest"] != config["ready"][name]["digest"]:
+    if record is None or record["digest"] != config["ready"][id_of(name)]["digest"]:
         return "failed", ("a step failed; see its log in .tribo/log; the next build will try it again",)
     if record["status"] == "unusable":
         return "unusable", tuple(_problem(p) for p in record["problems"])

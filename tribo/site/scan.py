@@ -20,7 +20,7 @@ from tribo.user_text import is_control, well_formed
 # how copying programs and browsers name a file that is not whole yet
 UPLOAD_SUFFIXES = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".download", ".filepart", ".upload", ".!ut")
 OVERRIDES = ".overrides.csv"
-_NOT_IN_NAMES = ("{", "}", "\\")  # the workflow would take braces for placeholders
+_NOT_IN_NAMES = ("\\",)
 _PAGES_OF_THE_SITE = ("index.html", "trend.csv")
 IGNORED = ("Thumbs.db", "desktop.ini", ".DS_Store")
 _CHUNK = 1 << 20

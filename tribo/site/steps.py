@@ -6,7 +6,9 @@ begins and when it ends. What a build shows and reports is taken from these two,
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -42,17 +44,30 @@ def read_record(path: Path, *keys: str) -> dict[str, Any] | None:
     return record if whole else None
 
 
+_PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,60}")
+_REPEATED = re.compile(r"(.+)\1{9}")
+
+
+def id_of(campaign: str) -> str:
+    """The name by which the workflow knows a campaign, and its folder of records: its own where that is plain.
+
+    Snakemake reads paths: ``<name>`` is a variable to it, and a part that is repeated often a loop of rules. No plain
+    name holds a "=".
+    """
+    if _PLAIN.fullmatch(campaign) and not _REPEATED.search(campaign):
+        return campaign
+    return f"={hashlib.sha256(campaign.encode('utf-8', 'surrogatepass')).hexdigest()[:24]}"
+
+
 class Step(NamedTuple):
-    """A step of a build: ``name`` as in the workflow, its campaign (empty for the index), and why it runs."""
+    """A step of a build: ``name`` as in the workflow, its campaign (empty for the index), and why it runs.
+
+    The campaign has its own name here, and :func:`id_of` it in paths.
+    """
 
     name: str
     campaign: str = ""
     why: str = ""
-
-    @classmethod
-    def of_record(cls, record: Path) -> Step:
-        """The step that leaves this record."""
-        return cls(INDEX) if record.name == f"{INDEX}.json" else cls(record.stem, record.parent.name)
 
     @property
     def kind(self) -> str:
@@ -62,7 +77,7 @@ class Step(NamedTuple):
     @property
     def log(self) -> Path:
         """Where it prints to, in the state of a site."""
-        return Path("log") / self.campaign / f"{self.name}.log"
+        return Path("log") / (id_of(self.campaign) if self.campaign else "") / f"{self.name}.log"
 
     def __str__(self) -> str:
         of = ", ".join(filter(None, (self.campaign, self.name.partition("-")[2])))
@@ -113,7 +128,7 @@ def due_steps(state: Path, ready: Mapping[str, Any], by_cell: bool) -> list[Step
     for campaign, inputs in ready.items():
         runs: list[str] = []
         for name in steps_of(inputs["cells"], by_cell):
-            record = read_record(state / "steps" / campaign / f"{name}.json", "digest")
+            record = read_record(state / "steps" / id_of(campaign) / f"{name}.json", "digest")
             needed = [r for r in runs if not (name.startswith("simulate-") and r.startswith("simulate-"))]
             if record is None:
                 why = "not finished before"

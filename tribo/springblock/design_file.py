@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from itertools import product
@@ -34,7 +33,14 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from tribo.campaign.description import PatternTable
 from tribo.errors import Problem, SimulationError, system_problem
-from tribo.input_files import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, MOST_RUNS, nests_too_deeply, read_input
+from tribo.input_files import (
+    DEEPEST_NESTING,
+    LARGEST_DESCRIPTION_BYTES,
+    MOST_RUNS,
+    nests_too_deeply,
+    read_input,
+    toml_table,
+)
 from tribo.records import Pattern
 from tribo.springblock.config import ANGLES, PAPER_PRESSURES_PA, PAPER_SAMPLES, FrictionTerms, LocalFriction, SimConfig
 from tribo.springblock.ensemble import AngleRule, angle_range_deg, check_all, middle_deg, stratified_design
@@ -80,7 +86,7 @@ def read_design(path: str | Path, seed: int = 0) -> list[SimConfig]:
     path = Path(path)
     try:
         text = read_input(path, LARGEST_DESCRIPTION_BYTES).decode("utf-8-sig")
-        table = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
+        table = json.loads(text) if path.suffix.lower() == ".json" else toml_table(text)
     except OSError as why:
         raise SimulationError(system_problem(why, str(path))) from why
     except ValueError as why:

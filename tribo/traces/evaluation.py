@@ -614,7 +614,7 @@ def _doubts(trace: Trace, pull: Pull, test: Test, *, one_speed: bool) -> list[Pr
     """Where what was recorded while sliding does not match the load or the speed of the test."""
     found = []
     if one_speed and trace.displacement_m is not None and test.speed_m_s and math.isfinite(pull.window_s[0]):
-        start, end = np.searchsorted(trace.time_s, pull.window_s)
+        start, end = np.minimum(np.searchsorted(trace.time_s, pull.window_s), len(trace.time_s) - 1)
         time_s = float(trace.time_s[end] - trace.time_s[start])
         travel_m = abs(float(trace.displacement_m[end] - trace.displacement_m[start]))
         if time_s > 0 and not abs(travel_m / time_s / test.speed_m_s - 1.0) < _OFF_SPEED:
