@@ -14,8 +14,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "display", "errors", "user_text", "input_files", "units", "zeroing", "fits", "records", "files", "temporary",
-    "forked", "laws", "vocabulary", "outputs",
+    "display", "errors", "user_text", "input_files", "workbook_sheets", "units", "zeroing", "fits", "records", "files",
+    "temporary", "forked", "laws", "vocabulary", "outputs",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("user_text", set()),
@@ -31,7 +31,8 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("vocabulary", set()),
     ("temporary", {"files", "errors"}),
     ("forked", set()),
-    ("input_files", {"errors", "files"}),
+    ("workbook_sheets", set()),
+    ("input_files", {"errors", "files", "workbook_sheets"}),
     ("cache", GROUND),
     ("campaign", GROUND),
     ("readers", GROUND),

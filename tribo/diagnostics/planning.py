@@ -326,7 +326,7 @@ def bits(distance2: float) -> float:
     return float(np.clip(1.0 - lost, 0.0, 1.0))
 
 
-def _predicted(f: ModelFit, rows: np.ndarray, **changed: FloatArray) -> FloatArray:
+def _predicted(f: ModelFit, rows: np.ndarray, **changed: Any) -> FloatArray:
     """ln T of the tests ``rows`` had they been made under other conditions, each an array of shape (rows,)."""
     s = f.setup
     observations = s.observations.take(rows)

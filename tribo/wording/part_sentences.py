@@ -366,8 +366,8 @@ def next_test_sentence(t: NextTest) -> str:
         alone = f"Vary {in_words(column)} alone, in random order, on one sample at one load"
         return f"{ALONE.get(column, alone)}: {pulls} pulls."
     if t.kind == "factorial":
-        varied = joined([in_words(name) for name in design["vary"]])
-        each = f"Set {varied} to their lowest and highest value, each with each, in random order"
+        both = joined([in_words(name) for name in design["vary"]])
+        each = f"Set {both} to their lowest and highest value, each with each, in random order"
         return f"{each}, on one sample at one load: {pulls} pulls."
     if t.kind == "vary what was fixed":
         varied = [v.text for name in t.separates if (v := mechanism(name).variation) is not None]
