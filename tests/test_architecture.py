@@ -48,6 +48,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("diagnostics", GROUND | {"fitting", "springblock", "mechanisms", "mechanisms_in_model"}),
     ("lawsearch", GROUND | {"fitting", "springblock", "mechanisms", "mechanisms_in_model", "diagnostics"}),
     ("berardo2019", GROUND | {"fitting", "springblock", "mechanisms", "diagnostics", "lawsearch"}),
+    ("design", GROUND | {"campaign", "cache", "springblock", "berardo2019"}),
     ("wording", GROUND | {"mechanisms", "comparison", "diagnostics", "lawsearch", "berardo2019"}),
     ("figures", GROUND | {"fitting", "comparison", "diagnostics", "lawsearch", "berardo2019", "wording"}),
     ("plot", GROUND | {"diagnostics", "berardo2019", "figures"}),

@@ -10,6 +10,7 @@ import click
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, ExportPath, GivenPath, command_options
+from tribo.cli.design_commands import design, map_family
 from tribo.cli.setup_commands import init
 from tribo.cli.simulate_command import simulate
 from tribo.cli.study_commands import compare, compare_reports, demo, diagnose, discover, fit, ingest, predict, report
@@ -43,7 +44,8 @@ def main() -> None:
 
 
 for command in (
-    build, init, schedule, simulate, discover, compare_reports, ingest, fit, predict, compare, diagnose, report, demo,
+    build, init, schedule, simulate, design, discover, compare_reports, ingest, fit, predict, compare, diagnose, report,
+    demo, map_family,
 ):  # fmt: skip
     main.add_command(command)
 

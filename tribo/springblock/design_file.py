@@ -135,7 +135,7 @@ def runs_of_design(table: Mapping[str, Any], file: str | None = None) -> list[Si
             [1e3 * p for p in design.pressures_kPa],
             design.repeats,
             design.seed,
-            _with_parameters(SimConfig().of_reading(design.reading), dict(zip(axes, combination, strict=True))),
+            with_parameters(SimConfig().of_reading(design.reading), dict(zip(axes, combination, strict=True))),
             design.angles_deg or ANGLES[design.reading],  # type: ignore[arg-type]
         )
     ]
@@ -285,7 +285,7 @@ def _pattern_of(sample: str, patterns: Mapping[str, Pattern]) -> Pattern | None:
     return patterns.get(sample) or (patterns.get(sample[:-1]) if sample[-1:] in ("x", "y") else None)
 
 
-def _with_parameters(base: SimConfig, values: Mapping[str, Any]) -> SimConfig:
+def with_parameters(base: SimConfig, values: Mapping[str, Any]) -> SimConfig:
     def of(part: type) -> dict[str, Any]:
         return {f.name: values[f.name] for f in fields(part) if f.name in values}
 

@@ -1,0 +1,165 @@
+"""tribo design: answers that can be made, the same again from kept runs, and refusals with the nearest."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tribo.campaign.description import PatternTable
+from tribo.campaign.geometry import Making, faults_of_making
+from tribo.cli import main
+from tribo.design import rounds
+from tribo.design.masks import polygons_um, repeat_um
+from tribo.design.space import Space
+from tribo.design.surrogate import fitted
+from tribo.design.target import Family, read_target
+from tribo.errors import SimulationError
+from tribo.units import CAMPAIGN_COLUMNS
+
+TARGET = """
+title = "Less static friction"
+nominal_area_mm2 = 50
+designs = 2
+[[target]]
+friction = "static"
+pressure_kPa = 10
+value = {value}
+tolerance_percent = 8
+[[pattern]]
+cavity = "circle"
+lattice = "hexagonal"
+diameter_um = [6, 24]
+pitch_um = [12, 40]
+smallest_wall_um = 3
+smallest_feature_um = 4
+"""
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search of few runs of few blocks."""
+    for name, value in {"FIRST": 8, "ROUNDS": 1, "BATCH": 3, "FINAL": 4, "FINE_RUNS": 2}.items():
+        monkeypatch.setattr(rounds, name, value)
+    meshes = {"coarse": (16, 5e-6, 1e-7), "fine": (20, 4e-6, 1e-7)}
+    meshes |= {"patch": (14, 4e-6, 1e-7), "halved": (28, 2e-6, 5e-8)}
+    monkeypatch.setattr(rounds, "MESHES", meshes)
+
+
+def designed(folder: Path, out: str = "out", value: float = 5.0, **more: str) -> tuple[int, dict]:
+    (folder / "t.toml").write_text(TARGET.format(value=value) + "".join(more.values()))
+    ran = CliRunner().invoke(main, ["design", str(folder / "t.toml"), "-o", str(folder / out), "--json", "--jobs", "1"])
+    return ran.exit_code, json.loads(ran.stdout)
+
+
+@pytest.mark.usefixtures("small")
+def test_designs_meet_the_target_can_be_made_and_come_with_their_campaign(tmp_path: Path):
+    """Ranked and distinct, intervals around the prediction, masks, a campaign of known columns and its pattern."""
+    status, found = designed(tmp_path)
+    assert status == 0
+    answers = found["answers"]
+    assert [a["rank"] for a in answers][:1] == [1]
+    assert len({tuple(a["lengths_um"].values()) for a in answers}) == len(answers) == 2
+    first = answers[0]["predictions"][0]
+    assert first["met"]
+    assert abs(first["value"] / 5.0 - 1) <= 0.08
+    assert first["low"] < first["value"] < first["high"]
+    assert set(first["parts"]) == {"runs", "mesh", "model", "making"}
+    folder = tmp_path / "out" / "design-1"
+    assert {p.name for p in folder.iterdir()} >= {"mask.svg", "mask.png", "campaign"}
+    rows = list(csv.DictReader((folder / "campaign" / "tests.csv").read_text().splitlines()))
+    assert set(rows[0]) <= set(CAMPAIGN_COLUMNS)
+    assert {row["sample"] for row in rows} == {"F", "P"}
+    import tomllib
+
+    described = tomllib.loads((folder / "campaign" / "campaign.toml").read_text())["patterns"]["P"]
+    pattern = PatternTable.model_validate(described).pattern("P")
+    assert pattern.area_fraction == pytest.approx(answers[0]["area_fraction"])
+    assert not list(faults_of_making(pattern, Making(4e-6, 3e-6, 0.5e-6)))
+
+
+@pytest.mark.usefixtures("small")
+def test_a_search_that_was_stopped_ends_with_the_same_answer(tmp_path: Path):
+    """To the bit, from the kept runs of its first half; and from none of them."""
+    designed(tmp_path, "whole")
+    shutil.copytree(tmp_path / "whole" / "kept", tmp_path / "half" / "kept")
+    for name in ("fine-1.h5", "fine-2.h5", "mesh-1.h5"):
+        (tmp_path / "half" / "kept" / name).unlink()
+    designed(tmp_path, "half")
+    one, other = ((tmp_path / name / "answer.json").read_bytes() for name in ("whole", "half"))
+    assert one == other
+
+
+@pytest.mark.usefixtures("small")
+def test_what_cannot_be_had_is_refused_with_the_nearest_and_the_limit(tmp_path: Path):
+    """More static friction than the flat sample has: the status is 1, and a design is named all the same."""
+    status, found = designed(tmp_path, value=15.0)
+    assert status == 1
+    assert "wanted 15" in found["refusal"][0]
+    assert "reach" in found["refusal"][0]
+    assert any("bound" in line or "smallest" in line for line in found["refusal"])
+    assert found["answers"][0]["predictions"][0]["off_percent"] > 20
+
+
+@pytest.mark.parametrize("need", ["a lubricant film", "wetting", "pillar height", "suction"])
+def test_what_the_model_does_not_contain_is_said_first(tmp_path: Path, need: str):
+    """Before any run."""
+    (tmp_path / "t.toml").write_text(f'needs = ["{need}"]\n' + TARGET.format(value=5.0))
+    with pytest.raises(SimulationError, match="the model does not contain"):
+        read_target(tmp_path / "t.toml")
+
+
+def test_faults_of_a_target_are_listed_at_once(tmp_path: Path):
+    """A goal too many, an unknown key, lengths that a family does not have."""
+    goals = '[[target]]\nfriction = "static"\nbest = "largest"\nvalue = 3\n'
+    text = TARGET.format(value=5.0) + "size_x_um = 4\n" + goals
+    (tmp_path / "t.toml").write_text(text + "[material]\ncolour = 3\n")
+    with pytest.raises(SimulationError) as refused:
+        read_target(tmp_path / "t.toml")
+    assert len(refused.value.problems) == 3
+
+
+def test_bounds_within_which_nothing_can_be_made_are_refused(tmp_path: Path):
+    """Every cavity touches the next one."""
+    text = TARGET.format(value=5.0).replace("[6, 24]", "[30, 40]").replace("[12, 40]", "[12, 29]")
+    (tmp_path / "t.toml").write_text(text)
+    ran = CliRunner().invoke(main, ["design", str(tmp_path / "t.toml"), "-o", str(tmp_path / "out")])
+    assert ran.exit_code == 1
+    assert "touches the next one" in ran.output
+
+
+FAMILIES = (
+    Family(cavity="circle", lattice="hexagonal", diameter_um=14, pitch_um=20),
+    Family(cavity="ellipse", lattice="staggered", size_x_um=20, size_y_um=9, pitch_x_um=40, pitch_y_um=15),
+    Family(cavity="rectangle", size_x_um=20, size_y_um=9, pitch_x_um=40, pitch_y_um=15, feature="pillar"),
+    Family(cavity="ridge", size_x_um=8, pitch_um=20),
+    Family(cavity="chevron", size_x_um=8, size_y_um=10, pitch_x_um=20, pitch_y_um=40),
+)
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda f: f.cavity)
+def test_polygons_of_a_mask_have_the_area_of_the_pattern(family: Family):
+    """To 0.1 %."""
+    space = Space(family, 0)
+    pattern = space.pattern(space.lengths_um(np.zeros(0)))
+    shapes = [p.T for p in polygons_um(pattern)]
+    area = sum(0.5 * abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) for x, y in shapes)
+    width, height = repeat_um(pattern)
+    covered = area / (width * height)
+    expected = pattern.area_fraction if family.feature == "pillar" else 1 - pattern.area_fraction
+    assert covered == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_surrogate_predicts_points_left_out():
+    """A smooth function of two lengths, to 5 % of its range from 20 points; its own estimate agrees."""
+    x = np.random.default_rng(0).random((40, 3))
+    y = np.sin(2 * x[:, 0]) + 0.5 * x[:, 1] ** 2 + x[:, 2]
+    found = fitted(x[:20], y[:20], 1e-3)
+    error = float(np.sqrt(np.mean((found(x[20:]) - y[20:]) ** 2)))
+    assert error < 0.05 * np.ptp(y)
+    assert error < 4 * found.left_out + 1e-3

@@ -1,0 +1,142 @@
+"""What a design leaves behind: designs.csv, answer.json, a page, and for each design its masks and its campaign."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import html
+import io
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from tribo.design.answer import NINETY, Answer, Outcome, Prediction
+from tribo.design.masks import gds, png, svg
+from tribo.design.space import Space
+from tribo.design.target import Target
+from tribo.files import write_bytes
+
+REPEATS, SPECIMENS = 4, 3
+SCATTER = 0.08  # of ln T from specimen to specimen, for the power that is stated
+MODEL = (
+    "The model contains dry friction of a flat surface with cavities: loads, directions, patterns. It does not contain "
+    "heights of asperities, indentation, wetting, films over a pattern, or suction."
+)
+
+
+def write_answer(outcome: Outcome, spaces: Sequence[Space], target: Target, out: Path) -> list[Path]:
+    """Write everything into OUT; the paths, best design first."""
+    files: dict[str, str | bytes] = {
+        "designs.csv": designs_csv(outcome.answers),
+        "answer.json": json.dumps(asdict(outcome), indent=1) + "\n",
+    }
+    pictures = []
+    for a in outcome.answers:
+        pattern = spaces[a.space].pattern(a.lengths_um)
+        folder = f"design-{a.rank}"
+        pictures.append(png(pattern))
+        files |= {f"{folder}/mask.svg": svg(pattern), f"{folder}/mask.png": pictures[-1]}
+        whole = gds(pattern, math.sqrt(target.nominal_area_mm2))
+        if whole is not None:
+            files[f"{folder}/mask.gds"] = whole
+        files |= {f"{folder}/campaign/{name}": text for name, text in campaign_of(a, spaces[a.space], target).items()}
+    files["design.html"] = page(outcome, target, pictures)
+    for name, content in files.items():
+        path = out / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(path, content if isinstance(content, bytes) else content.encode())
+    return [out / name for name in files]
+
+
+def designs_csv(answers: Sequence[Answer]) -> str:
+    """One row a design and wanted quantity."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(
+        ["rank", "lengths_um", "area_fraction", "want", "goal", "value", "low_90", "high_90", "met", "off_percent"]
+    )
+    for a in answers:
+        lengths = " ".join(f"{k}={v:g}" for k, v in a.lengths_um.items())
+        for p in a.predictions:
+            numbers = [f"{v:.5g}" for v in (p.value, p.low, p.high)]
+            area, off = f"{a.area_fraction:.4f}", f"{p.off_percent:.2f}"
+            rows.writerow([a.rank, lengths, area, p.want, p.goal, *numbers, p.met, off])
+    return text.getvalue()
+
+
+def campaign_of(a: Answer, space: Space, target: Target) -> dict[str, str]:
+    """campaign.toml and tests.csv of the measurement that would disprove a design: its pattern beside a flat sample."""
+    f = space.family
+    u = a.lengths_um
+    keys = [f'cavity = "{f.cavity}"', f'feature = "{f.feature}"', f'lattice = "{f.lattice}"']
+    if f.cavity == "circle":
+        keys.append(f"diameter_um = {u['diameter_um']:g}")
+    elif "size_y_um" in u:
+        keys.append(f"size_um = [{u['size_x_um']:g}, {u['size_y_um']:g}]")
+    else:
+        keys.append(f"size_um = {u['size_x_um']:g}")
+    pitch = f"{u['pitch_um']:g}" if "pitch_um" in u else f"[{u['pitch_x_um']:g}, {u['pitch_y_um']:g}]"
+    keys.append(f"pitch_um = {pitch}")
+    power = power_of(a.predictions)
+    toml = (
+        f"# The measurement that would disprove this design. {power}\n[campaign]\ntitle = {json.dumps(target.title)}\n"
+        'material = "as in the target"\ncounterface = "as in the target"\n'
+        f"nominal_area_mm2 = {target.nominal_area_mm2:g}\nslider_mass_g = 0\npull_speed_mm_s = 0.2\n\n"
+        '[patterns.F]\ncavity = "none"\n\n[patterns.P]\n' + "\n".join(keys) + "\n"
+    )
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["test_id", "file", "sample", "specimen", "normal_load_N", "repeat"])
+    directions = {d for w in target.target for d in (w.direction, w.over) if d}
+    samples = ["F", *("P" if d == "all" else f"P{d}" for d in sorted(directions))]
+    wanted_N = {1e-6 * target.nominal_area_mm2 * target.pressure_Pa(w) for w in target.target}
+    loads = sorted({load * k for load in wanted_N for k in (0.5, 1.0, 2.0)})
+    tests = [(s, n, load, r) for r in range(REPEATS) for n in range(SPECIMENS) for load in loads for s in samples]
+    for k, (sample, specimen, load, repeat) in enumerate(tests, start=1):
+        name = f"T{k:03d}"
+        rows.writerow([name, f"raw/{name}.csv", sample, f"{sample[0]}{specimen + 1}", f"{load:.6g}", repeat + 1])
+    return {"campaign.toml": toml, "tests.csv": text.getvalue()}
+
+
+def power_of(predictions: Sequence[Prediction]) -> str:
+    """How sure the measurement is to show that a friction outside the interval is outside it."""
+    p = predictions[0]
+    half = 0.5 * math.log(p.high / p.low)
+    error = SCATTER * math.sqrt(2 / SPECIMENS)
+    shown = 0.5 * (1 + math.erf((half - NINETY * error) / (error * math.sqrt(2))))
+    return (
+        f"With {SPECIMENS} specimens of each sample, {REPEATS} pulls at a load, and {100 * SCATTER:.0f} % scatter from "
+        "specimen to specimen, a friction twice as far from the prediction as its 90 % interval reaches is told in "
+        f"{100 * shown:.0f} % of cases."
+    )
+
+
+def page(outcome: Outcome, target: Target, pictures: Sequence[bytes]) -> str:
+    """One file that works offline."""
+    parts = [f"<h1>{html.escape(target.title)}</h1>", f"<p>{MODEL}</p>"]
+    if outcome.refusal:
+        said = "".join(f"<li>{html.escape(line)}</li>" for line in outcome.refusal)
+        parts.append(f"<h2>This cannot be had</h2><ul>{said}</ul><p>The designs below are the nearest that can.</p>")
+    for a, picture in zip(outcome.answers, pictures, strict=True):
+        lengths = ", ".join(f"{k.removesuffix('_um').replace('_', ' ')} {v:g} µm" for k, v in a.lengths_um.items())
+        rows = "".join(
+            f"<tr><td>{html.escape(p.want)}</td><td>{html.escape(p.goal)}</td><td>{p.value:.3g}</td>"
+            f"<td>{p.low:.3g} to {p.high:.3g}</td>"
+            + "".join(f"<td>{100 * p.parts[part]:.1f}</td>" for part in ("runs", "mesh", "model", "making"))
+            + f"<td>{'yes' if p.met else f'no, {p.off_percent:.0f} % off'}</td></tr>"
+            for p in a.predictions
+        )
+        parts.append(
+            f"<h2>Design {a.rank}: {html.escape(target.pattern[a.space].cavity)}, {html.escape(lengths)}</h2>"
+            f'<img alt="Mask of design {a.rank}, 200 um wide; white touches" width="240" '
+            f'src="data:image/png;base64,{base64.b64encode(picture).decode()}">'
+            f"<p>Contact area fraction {a.area_fraction:.3f}. What moves it most: {html.escape(a.moves_most)}.</p>"
+            "<table border=1 cellpadding=4><tr><th>wanted</th><th>goal</th><th>predicted</th><th>90 % interval</th>"
+            "<th>runs, %</th><th>mesh, %</th><th>model, %</th><th>making, %</th><th>met</th></tr>" + rows + "</table>"
+            f"<p>{html.escape(power_of(a.predictions))}</p>"
+        )
+    parts += [f"<p>{html.escape(note)}.</p>" for note in outcome.notes]
+    style = "<style>body{font:15px sans-serif;max-width:60em;margin:2em auto}table{border-collapse:collapse}</style>"
+    return f'<!doctype html><meta charset="utf-8"><title>{html.escape(target.title)}</title>{style}' + "".join(parts)

@@ -1,0 +1,249 @@
+"""The search: runs of few blocks over the whole family, a surrogate, more runs where it matters, and fine runs last.
+
+Every design meets the same random numbers, so that differences between designs are sharper than their values. All runs
+go through the one scheduler into files of their own; what they hold is not made again, and what is run next follows
+from them alone. A search that was stopped therefore ends with the same answer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tribo.design.space import Space
+from tribo.design.surrogate import Surrogate, fitted
+from tribo.design.target import Target, Want
+from tribo.records import FloatArray
+from tribo.springblock.config import SimConfig
+from tribo.springblock.ensemble import run_seed
+from tribo.springblock.kept_runs import run_stored
+
+COARSE_RUNS, FINE_RUNS = 2, 4
+FIRST, ROUNDS, BATCH, FINAL = 14, 3, 5, 6
+CANDIDATES = 2048
+APART = 0.05  # of the span of a length or of the area fraction, between two designs of a round
+# blocks a side, their spacing in m, time step in s: of the search, of its answers, and of the mesh error on one patch
+MESHES = {
+    "coarse": (40, 5e-6, 1e-7), "fine": (80, 2.5e-6, 5e-8), "patch": (48, 2.5e-6, 5e-8),
+    "halved": (96, 1.25e-6, 2.5e-8),
+}  # fmt: skip
+SPREAD_DEG = 10.0
+Response = tuple[str, float, str]  # regime, pressure in Pa, direction
+Lengths = dict[str, float]
+Say = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """What all rounds of runs share: families, what is wanted of each design, and where and how runs are made."""
+
+    spaces: Sequence[Space]
+    wanted: Sequence[Response]
+    folder: Path
+    seed: int
+    jobs: int
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One design: its family, lengths, and ln(T/N) of every response with its standard error."""
+
+    space: int
+    lengths_um: Lengths
+    logs: dict[Response, float]
+    errors: dict[Response, float]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search has: all coarse designs, the surrogates of each family, and the fine designs, best first."""
+
+    coarse: list[Tried]
+    fine: list[Tried]
+    finer: list[Tried]  # the same on half the mesh
+    surrogates: dict[int, dict[Response, Surrogate]]
+
+
+def responses(target: Target) -> list[Response]:
+    """What has to be simulated: each regime, pressure and direction once."""
+    found: dict[Response, None] = {}
+    for want in target.target:
+        for direction in (want.direction, want.over):
+            if direction is not None:
+                regimes = ("static", "sliding") if want.friction == "static over sliding" else (want.friction,)
+                found.update({(regime, target.pressure_Pa(want), direction): None for regime in regimes})
+    return list(found)
+
+
+def reached(want: Want, target: Target, logs: dict[Response, float] | dict[Response, FloatArray]) -> FloatArray:
+    """ln of the wanted quantity, from ln(T/N) of the responses."""
+    p = target.pressure_Pa(want)
+    if want.friction == "static over sliding":
+        value = np.asarray(logs[("static", p, want.direction)]) - np.asarray(logs[("sliding", p, want.direction)])
+    else:
+        value = np.asarray(logs[(want.friction, p, want.direction)])
+    if want.over is not None:
+        value = value - np.asarray(logs[(want.friction, p, want.over)])
+    return value
+
+
+def misses(want: Want, target: Target, logs: dict[Response, float] | dict[Response, FloatArray]) -> FloatArray:
+    """By how many tolerances the wanted quantity is missed, zero within bounds; for a best value, its own measure."""
+    value = reached(want, target, logs)
+    tolerance = math.log1p(want.tolerance_percent / 100)
+    if want.best is not None:
+        return np.asarray((-value if want.best == "largest" else value) / tolerance)
+    goal = target.goal(want)
+    if goal is not None:
+        return np.asarray(np.abs(value - math.log(goal)) / tolerance)
+    low = math.log(want.at_least) if want.at_least else -math.inf
+    high = math.log(want.at_most) if want.at_most else math.inf
+    return np.asarray(np.maximum(np.maximum(low - value, value - high), 0.0) / tolerance)
+
+
+def cost(target: Target, logs: dict[Response, float] | dict[Response, FloatArray]) -> FloatArray:
+    """What a search makes small: misses beyond bounds and values squared, best values as they are."""
+    return np.asarray(sum(
+        misses(w, target, logs) if w.best else misses(w, target, logs) ** 2 for w in target.target
+    ))  # fmt: skip
+
+
+def designed(
+    all_rounds: Rounds, chosen: Sequence[tuple[int, Lengths]], base: SimConfig, runs: int, seed: int
+) -> list[SimConfig]:
+    """The runs of some designs: each pressure and direction, the same seeds and angles for every design."""
+    points = list(dict.fromkeys((p, d) for _, p, d in all_rounds.wanted))
+    found = []
+    for number, lengths in chosen:
+        pattern = all_rounds.spaces[number].pattern(lengths)
+        for pressure, direction in points:
+            low, high = (0.0, 90.0) if direction == "all" else (-SPREAD_DEG, SPREAD_DEG)
+            middle = 90.0 if direction == "y" else 0.0
+            for k in range(runs):
+                angle = middle + low + (high - low) * (k + 0.5) / runs
+                found.append(base.with_(
+                    sample="P", pattern=pattern, pressure_Pa=pressure, angle_deg=angle,
+                    seed=run_seed(seed, direction, pressure, k),
+                ))  # fmt: skip
+    return found
+
+
+def tried(
+    all_rounds: Rounds, name: str, chosen: Sequence[tuple[int, Lengths]], base: SimConfig, runs: int, seed: int,
+    progress: Callable[[int, int], None] | None,
+) -> list[Tried]:  # fmt: skip
+    """Run some designs, or read their runs, and return their means."""
+    wanted = all_rounds.wanted
+    configs = designed(all_rounds, chosen, base, runs, seed)
+    table = run_stored(configs, all_rounds.folder / f"{name}.h5", all_rounds.jobs, progress=progress)
+    points = list(dict.fromkeys((p, d) for _, p, d in wanted))
+    values = {
+        regime: np.log(table[f"{regime}_friction"].to_numpy(float)).reshape(len(chosen), len(points), runs)
+        for regime in ("static", "sliding")
+    }
+    found = []
+    for k, (number, lengths) in enumerate(chosen):
+        cells = {r: values[r[0]][k, points.index(r[1:])] for r in wanted}
+        found.append(Tried(
+            number, lengths, {r: float(np.log(np.exp(v).mean())) for r, v in cells.items()},
+            {r: float(v.std(ddof=1) / math.sqrt(runs)) if runs > 1 else 0.05 for r, v in cells.items()},
+        ))  # fmt: skip
+    return found
+
+
+def surrogates_of(spaces: Sequence[Space], known: Sequence[Tried]) -> dict[int, dict[Response, Surrogate]]:
+    """One surrogate for each family and response."""
+    found: dict[int, dict[Response, Surrogate]] = {}
+    for number, space in enumerate(spaces):
+        own = [t for t in known if t.space == number]
+        if len(own) < 4:
+            continue
+        x = np.array([space.at(t.lengths_um) for t in own])
+        found[number] = {
+            r: fitted(x, np.array([t.logs[r] for t in own]), 0.3 * float(np.mean([t.errors[r] for t in own])))
+            for r in own[0].logs
+        }
+    return found
+
+
+def promising(
+    spaces: Sequence[Space], known: Sequence[Tried], surrogates: dict[int, dict[Response, Surrogate]],
+    target: Target, shift: dict[Response, float], n: int, seed: int,
+) -> list[tuple[int, Lengths]]:  # fmt: skip
+    """The n designs of least expected cost that lie apart from each other and are not known yet."""
+    pool: list[tuple[float, int, Lengths, FloatArray]] = []
+    for number, space in enumerate(spaces):
+        candidates = space.candidates(CANDIDATES, seed)
+        if not candidates or number not in surrogates:
+            continue
+        x = np.array([space.at(lengths) for lengths in candidates])
+        logs = {r: s(x) + shift.get(r, 0.0) for r, s in surrogates[number].items()}
+        costs = cost(target, logs).tolist()
+        pool += [(c, number, lengths, at) for c, lengths, at in zip(costs, candidates, x, strict=True)]
+    seen = {(t.space, tuple(t.lengths_um.values())) for t in known}
+    chosen: list[tuple[int, Lengths]] = []
+    places: list[tuple[int, FloatArray]] = []
+    for _, number, lengths, at in sorted(pool, key=lambda item: item[0]):
+        far = all(number != k or np.abs(at - other).max() >= APART for k, other in places)
+        if far and (number, tuple(lengths.values())) not in seen:
+            chosen.append((number, lengths))
+            places.append((number, at))
+        if len(chosen) == n:
+            break
+    return chosen
+
+
+def search(
+    spaces: Sequence[Space], target: Target, base: SimConfig, folder: Path, seed: int, jobs: int, say: Say
+) -> Found:
+    """Coarse runs over each family, rounds of more where the surrogate expects the target, then fine ones."""
+    wanted = responses(target)
+    all_rounds = Rounds(spaces, wanted, folder, seed, jobs)
+    coarse, fine, patch, halved = (
+        base.with_(blocks=(n, n), spacing_m=spacing, thickness_m=base.layer_m, dt_s=dt, rest_tolerance=1e-2)
+        for n, spacing, dt in MESHES.values()
+    )
+    points = len({r[1:] for r in wanted})
+    steps = (len(spaces) * FIRST + ROUNDS * BATCH) * COARSE_RUNS * points
+    total, done = steps + 2 * FINAL * FINE_RUNS * points * 12, 0  # a fine run takes about twelve coarse ones
+
+    def made(
+        name: str, chosen: Sequence[tuple[int, Lengths]], config: SimConfig, runs: int, own: int, weight: int
+    ) -> list[Tried]:
+        nonlocal done
+        before = done
+        found = tried(
+            all_rounds, name, chosen, config, runs, own,
+            lambda k, n: say("designing", min(before + k * weight, total), total),
+        )  # fmt: skip
+        done += len(chosen) * runs * points * weight
+        return found
+
+    first = [(k, lengths) for k, space in enumerate(spaces) for lengths in space.candidates(FIRST, seed)]
+    known = made("first", first, coarse, COARSE_RUNS, seed, 1)
+    for turn in range(ROUNDS):
+        batch = promising(spaces, known, surrogates_of(spaces, known), target, {}, BATCH, seed + 1 + turn)
+        if batch:
+            known += made(f"round-{turn + 1}", batch, coarse, COARSE_RUNS, seed, 1)
+    surrogates = surrogates_of(spaces, known)
+    best = sorted(known, key=lambda t: float(cost(target, t.logs)))[: FINAL // 2]
+    chosen = [(t.space, t.lengths_um) for t in best]
+    fine_first = made("fine-1", chosen, fine, FINE_RUNS, seed + 100, 12)
+    # what the finer mesh changes is nearly the same for neighbours: aim again with it taken into account
+    shift = {r: float(np.mean([f.logs[r] - c.logs[r] for f, c in zip(fine_first, best, strict=True)])) for r in wanted}
+    again = promising(spaces, fine_first, surrogates, target, shift, FINAL - len(fine_first), seed + 50)
+    fine_all = fine_first + (made("fine-2", again, fine, FINE_RUNS, seed + 100, 12) if again else [])
+    fine_all.sort(key=lambda t: float(cost(target, t.logs)))
+    distinct: list[Tried] = []
+    for t in fine_all:
+        x = spaces[t.space].at(t.lengths_um)
+        near = any(t.space == o.space and np.abs(x - spaces[o.space].at(o.lengths_um)).max() < 0.04 for o in distinct)
+        if not near and len(distinct) < target.designs:
+            distinct.append(t)
+    pairs = [(t.space, t.lengths_um) for t in distinct[:1]]
+    finer = made("mesh-2", pairs, patch, 2, seed + 200, 6) + made("mesh-1", pairs, halved, 2, seed + 200, 40)
+    return Found(known, distinct, finer, surrogates)
