@@ -274,7 +274,7 @@ def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, Pull
     ``down``.
     """
     from tribo.traces import load_of, pieces_of
-    from tribo.traces.drive import speed_level_m_s
+    from tribo.traces.drive import rotation_level_rev_per_s, speed_level_m_s
     from tribo.traces.phases import under_load_s
 
     test = options.test
@@ -291,10 +291,12 @@ def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, Pull
     pieces = {a: found for a, found in pieces.items() if begin_s <= float(np.median(found[0].time_s)) <= end_s}
     if len(pieces) < 2:
         return []
-    speeds, loads = (
-        [of(piece) for piece, _ in pieces.values()] for of in (speed_level_m_s, lambda piece: load_of(piece)[0])
+    speeds, turns, loads = (
+        [of(piece) for piece, _ in pieces.values()]
+        for of in (speed_level_m_s, rotation_level_rev_per_s, lambda piece: load_of(piece)[0])
     )
-    varies = next((values for values in (speeds, loads) if max(values) > (1.0 + _LEVELS_DIFFER) * min(values)), None)
+    apart = 1.0 + _LEVELS_DIFFER
+    varies = next((values for values in (speeds, turns, loads) if max(values) > apart * min(values)), None)
     if varies is None:
         return []
     export, table = split_choice(trace.file)
@@ -307,6 +309,8 @@ def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, Pull
         level = replace(test, test_id=name, file=file, covariates={**test.covariates, **about})
         if math.isfinite(speeds[k]):
             level = replace(level, speed_m_s=speeds[k])
+        elif math.isfinite(turns[k]):  # without a radius there is no sliding speed
+            level = replace(level, covariates={**level.covariates, "speed_rps": f"{turns[k]:.4g}"})
         if varies is loads:
             level = replace(level, normal_load_N=math.nan)
         found.append((replace(piece, name=name, file=file), replace(own, test=level)))

@@ -193,6 +193,14 @@ def speed_level_m_s(trace: Trace) -> float:
     return level_of(np.sign(drive.pace[drive.moving]) * speed[drive.moving])
 
 
+def rotation_level_rev_per_s(trace: Trace) -> float:
+    """The level of the recorded rotation while the drive moves, without its sign; NaN where it was not recorded."""
+    drive = drive_of(trace)
+    if drive is None or drive.channel != "rotation speed" or not drive.moving.any():
+        return math.nan
+    return level_of(np.sign(drive.pace[drive.moving]) * trace.columns["rotation_rev_per_s"][drive.moving])
+
+
 def level_of(values: FloatArray) -> float:
     """Mean of some values, the outermost twentieths drawn in to the next ones; NaN where a value is."""
     if not np.isfinite(values).all():

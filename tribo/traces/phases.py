@@ -43,6 +43,7 @@ from tribo.traces.signal import (
     wander,
 )
 from tribo.traces.sliding import transient_end
+from tribo.traces.standstills import standstills
 
 _FLAT_START = 0.02  # share of a record that shows the load before contact, if there is such a part
 _LEVEL = 0.1  # share of the swing of a load within which it counts as level, and above which the bodies touch
@@ -112,6 +113,8 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
     """
     samples = signal.time_s.size
     contact = _contact(trace.columns.get("normal_force_N"), samples)
+    if contact[0] > 0 and _slides_under(trace.columns["normal_force_N"], signal, contact):
+        contact = 0, contact[1]
     drive = drive_of(trace)
     moving = drive.moving if drive is not None and not drive.turns else None
     begins_at_rest = moving is None or not moving[: FEWEST_AT_REST * 2].all()
@@ -129,8 +132,13 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
         at_once = at_once or _begins_high(signal, touching, turns=turns, told=turns and moving is not None)
     else:
         at_once = False
-    if moving is None:
-        stops, end = force_stops(signal, contact, in_motion=at_once), contact[1]
+    told = None
+    if drive is None and not reversals(signal.force_N):
+        told = standstills(_over_load(trace, signal, contact).force_N[contact[0] : contact[1]])
+    if told is not None:
+        stops, end = [(contact[0] + a, contact[0] + b) for a, b in told[0]], contact[0] + told[1]
+    elif moving is None:
+        stops, end = force_stops(_over_load(trace, signal, contact), contact, in_motion=at_once), contact[1]
         if drive is not None and drive.moving.any():
             end = min(end, int(np.flatnonzero(drive.moving)[-1]) + 1)
         else:
@@ -149,9 +157,15 @@ def course_of_piece(trace: Trace, signal: Signal, *, starts_sliding: bool) -> Co
         end = end if whole[1] - end >= FEWEST_AT_REST else whole[1]
     else:
         held = _before_it_turns(signal.calm_N)
-        end = quiet_end(signal.force_N[:held])
+        end = stands_from(signal.force_N[:held])
         end = end if end < held else whole[1]
     return Course(whole, end, (), (), starts_sliding)
+
+
+def stands_from(force_N: FloatArray) -> int:
+    """The sample of one stroke from which its drive stands still until the end, by its force; its size without one."""
+    told = standstills(force_N)
+    return told[1] if told is not None and told[1] < force_N.size else quiet_end(force_N)
 
 
 def _before_it_turns(force_N: FloatArray) -> int:
@@ -204,6 +218,29 @@ def _contact(load: FloatArray | None, samples: int) -> Range:
     free = np.flatnonzero(height[end:] <= none)
     end += int(free[0]) - FEWEST_AT_REST // 2 + 1 if free.size else 0
     return min(begin, int(touching[0]) + FEWEST_AT_REST // 2), end if samples - end >= FEWEST_AT_REST else samples
+
+
+def _over_load(trace: Trace, signal: Signal, contact: Range) -> Signal:
+    """A signal whose force is that over the load where that goes from one level to another within a contact."""
+    load = trace.columns.get("normal_force_N")
+    if load is None or not np.isfinite(load).all() or not level_cuts(np.abs(load[contact[0] : contact[1]])):
+        return signal
+    usual = float(np.median(np.abs(load[contact[0] : contact[1]])))
+    share = usual / np.maximum(median_of_three(np.abs(load)), 0.1 * usual) if usual > 0 else 1.0
+    return replace(signal, force_N=signal.force_N * share, smooth_N=signal.smooth_N * share)
+
+
+def _slides_under(load: FloatArray, signal: Signal, contact: Range) -> bool:
+    """Whether what looks like an approach is the lowest level of a ladder of loads: friction follows the load there."""
+    first, last = contact[0], min(contact[0] + max(contact[0], FEWEST_AT_REST), contact[1])
+    if min(first, last - first) < 4 * FEWEST_AT_REST:
+        return False
+    early, late = slice(first - first // 3, max(first - FEWEST_AT_REST, 1)), slice(last - (last - first) // 3, last)
+    (low, high), (little, much) = (
+        [float(np.median(np.abs(values[part]))) for part in (early, late)] for values in (load, signal.force_N)
+    )
+    follows = low > _NONE * high and 0.5 * little * high < much * low < 2.0 * little * high
+    return follows and little > _FELT * signal.noise_N / math.sqrt(max(first // 3, 1))
 
 
 def force_stops(signal: Signal, contact: Range, *, in_motion: bool) -> list[Range]:
@@ -505,7 +542,7 @@ def _strokes(signal: Signal, drive: Drive | None, span: Range) -> list[_Span]:
         else:
             first = _reversal(signal, (begin, end), a)[1] if k else a
             turns_at = _reversal(signal, (begin, end), b)[0] if b < end else b
-            last = min(first + quiet_end(signal.force_N[first:turns_at]), turns_at)
+            last = min(first + stands_from(signal.force_N[first:turns_at]), turns_at)
             found += _between_strokes(found, first, last - first, "the force")
         found.append(_Span("stroke", first, last, "the drive moves" if told else "the force", cycle=cycle))
         if not told and b < end and turns_at - last >= FEWEST_AT_REST:
@@ -567,10 +604,10 @@ def _motion(
 def _drawn_in(cut: tuple[int, int, str], width: int) -> tuple[int, int, str]:
     """A passage from one level to the next without what a mean over so many samples adds to it."""
     first, last, name = cut
-    if last - first > 1.5 * width:
-        return cut  # the mean of a ramp is a ramp
-    middle = (first + last) // 2
-    return middle, middle + 1, name
+    lasts = math.sqrt(max((last - first) ** 2 - width**2, 0.0))  # the squares of the lengths of ramps and means add up
+    middle, half = (first + last) / 2.0, max(lasts, 1.0) / 2.0
+    start = int(middle - half)
+    return cut if width <= 1 else (start, max(int(middle + half), start + 1), name)
 
 
 def _reversal(signal: Signal, span: Range, at: int) -> Range:

@@ -25,6 +25,7 @@ _SLOWEST = 3  # coefficients after it in which drift that is left
 _STANDS_OUT = 3.0  # by this many times the variance of all
 _COSINES = 12  # coefficients after it that tell the noise of its mean
 _COSINES_OF_ALL = 20  # the same of a whole slide
+_COSINES_OF_STROKE = 4  # the same of a stroke, whose neighbours tell of its noise as well
 _FEWEST = 12  # samples from which on a mean has an interval
 _MIDDLE = 0.4  # share of a stroke, around its middle, whose force is that of the stroke
 _DIFFER = 0.05  # share by which speeds or loads of two plateaus differ that make a step
@@ -121,8 +122,6 @@ def mean_of_level(force_N: FloatArray) -> Interval:
     mean, n = float(force_N.mean()), force_N.size
     if n < _FEWEST:
         return mean, -math.inf, math.inf
-    from scipy.stats import t
-
     along = np.linspace(-1.0, 1.0, n)
     for degree in _DEGREES:
         rest = force_N - np.polynomial.legendre.legval(along, np.polynomial.legendre.legfit(along, force_N, degree))
@@ -130,8 +129,15 @@ def mean_of_level(force_N: FloatArray) -> Interval:
         slowest, _ = _variance(rest, degree + 1, _SLOWEST)
         if slowest < _STANDS_OUT * variance or n < 4 * (degree + dof):
             break
-    half = float(t.ppf(0.975, dof)) * math.sqrt(variance / n)
+    half = _t(dof) * math.sqrt(variance / n)
     return mean, mean - half, mean + half
+
+
+def _t(dof: int) -> float:
+    """Half width of a 95 % interval in standard uncertainties."""
+    from scipy.stats import t
+
+    return float(t.ppf(0.975, dof))
 
 
 def _half(interval: Interval) -> float:
@@ -216,7 +222,7 @@ def _step(one: _Level, other: _Level) -> Iterator[Reading]:
 def _direct(one: _Level, other: _Level) -> Interval | None:
     """How far the force goes at once after a step of speed before it turns to its steady state; None if it does not.
 
-    A parabola through the force after its extreme, over a quarter of the time that it takes to come half-way down.
+    By an exponential through the force from its extreme on, over six times the time in which it comes half-way down.
     """
     samples = other.part.between(max(other.begin_s, one.phase.end_s), other.phase.end_s)
     force = other.part.trace.force_N[samples] - other.part.pull.zero_N
@@ -233,18 +239,23 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
     if -min(below) < _ABOVE_NOISE * float(np.abs(late - np.median(late)).max()) or height[at] <= 0:
         return None
     lower = np.flatnonzero(height[at:] < 0.5 * height[at])
-    width = max(int(lower[0]) // 2 if lower.size else 0, 6)
-    part = force[at : at + width]
-    if part.size < 6:
+    half = max(int(lower[0]) if lower.size else 0, 3)
+    part = force[at : at + 6 * half]
+    if part.size < 2 * _FEWEST:
         return None
-    along = np.arange(part.size) / part.size
-    design = np.vander(along, 3)
-    best, *_ = np.linalg.lstsq(design, part, rcond=None)
-    fitted = design @ best
-    top = int(np.argmax(fitted) if upward else np.argmin(fitted))
-    spread = math.sqrt(float(((part - fitted) ** 2).sum()) / (part.size - 3))
-    leverage = float(design[top] @ np.linalg.inv(design.T @ design) @ design[top])
-    return _about(float(fitted[top]) - old, 1.96 * spread * math.sqrt(leverage), _half(one.mean))
+    along = np.arange(part.size, dtype=float)
+    fits = []
+    for tau in np.geomspace(0.3 * half, 6.0 * half, 60):
+        design = np.column_stack((np.ones(part.size), np.exp(-along / tau)))
+        best, *_ = np.linalg.lstsq(design, part, rcond=None)
+        fits.append((float(((part - design @ best) ** 2).sum()), float(best.sum()), design))
+    squares, top, design = min(fits, key=lambda fit: fit[0])
+    variance, _ = _variance(part - design @ np.linalg.lstsq(design, part, rcond=None)[0], 3)
+    variance = max(variance, squares / (part.size - 3))
+    near = [value for other, value, _ in fits if other <= squares + 4.0 * variance]
+    leverage = float(np.linalg.pinv(design.T @ design).sum())
+    u = math.sqrt(variance * leverage + ((max(near) - min(near)) / 4.0) ** 2)
+    return _about(top - old, 2.2 * u, _half(one.mean))
 
 
 @dataclass(frozen=True)
@@ -268,8 +279,22 @@ def _strokes(parts: Sequence[Part]) -> list[_Stroke]:
             samples = part.between(phase.start_s + margin, phase.end_s - margin)
             force = part.trace.force_N[samples] * (part.direction or 1)
             if force.size >= _FEWEST:
-                found.append(_Stroke(part, phase, mean_of_level(force), phase.speed_m_s))
-    return found
+                found.append((part, phase, force))
+    if not found:
+        return []
+    noise = [_variance(_without_line(force), 2, _COSINES_OF_STROKE) for _, _, force in found]
+    variance = float(np.mean([share for share, _ in noise]))
+    dof = sum(cosines for _, cosines in noise)
+    return [
+        _Stroke(part, phase, _about(float(force.mean()), _t(dof) * math.sqrt(variance / force.size)), phase.speed_m_s)
+        for part, phase, force in found
+    ]
+
+
+def _without_line(force: FloatArray) -> FloatArray:
+    along = np.arange(force.size, dtype=float)
+    slope, x0, y0 = line(along, force)
+    return force - y0 - slope * (along - x0)
 
 
 def _cycles(strokes: Sequence[_Stroke]) -> Iterator[Reading]:
@@ -370,7 +395,7 @@ def _state(time_s: FloatArray, force: FloatArray) -> Literal["steady", "still dr
     found = []
     for tau in np.geomspace(_SHORTEST_TAU, _LONGEST_TAU, 200):
         design = np.column_stack((np.ones(n), along, np.exp(-along / tau)))
-        inverse = np.linalg.inv(design.T @ design)
+        inverse = np.linalg.pinv(design.T @ design)
         best = inverse @ (design.T @ force)
         over = np.array((0.0, _LATE, math.exp(-1.0 / tau) - math.exp(-late / tau)))
         straight = np.array((0.0, _LATE, 0.0))
@@ -410,7 +435,7 @@ def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Inter
     Least squares over the level, the change and its time constant; the noise is that of the residuals, correlation
     counted, and the interval of the time that of the profile.
     """
-    from scipy.stats import f as f_distribution, t
+    from scipy.stats import f as f_distribution
 
     n, end = time_s.size, float(time_s[-1])
     low, high = max(float(time_s[1] - time_s[0]), end / n) / 2.0, 10.0 * end
@@ -431,7 +456,7 @@ def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Inter
         return None
     took = -math.log(_ARRIVED)
     left = max(abs(change[k]) * math.exp(-end / taus[k]) for k in near)
-    u = math.sqrt(variance / n) * float(t.ppf(0.975, dof))
+    u = math.sqrt(variance / n) * _t(dof)
     steady = float(level[best]), float(level[near].min()) - u, float(level[near].max()) + u
     return steady, (took * float(taus[best]), took * float(taus[near[0]]), took * float(taus[near[-1]])), float(left)
 
@@ -457,12 +482,10 @@ def _holds(part: Part) -> list[Reading]:
 
 
 def _healing(part: Part, holds: Sequence[Reading], log_s: FloatArray, gain_N: FloatArray) -> Reading:
-    from scipy.stats import t
-
     slope, x0, y0 = line(log_s, gain_N)
     rest = gain_N - y0 - slope * (log_s - x0)
     u = math.sqrt(float(rest @ rest) / (log_s.size - 2) / float(((log_s - x0) ** 2).sum()))
-    half = float(t.ppf(0.975, log_s.size - 2)) * u
+    half = _t(log_s.size - 2) * u
     values: Mapping[str, Interval] = {"healing_N_per_decade": _about(slope, half)}
     return Reading(
         part.test.test_id, "healing", holds[0].start_s, holds[-1].end_s, normal_load_N=part.test.normal_load_N,
