@@ -197,8 +197,10 @@ def _step_truth(record: Record, near_s: float) -> dict[str, float]:
     found = {"total_change_N": new - old}
     top, bottom = float(after.max()), float(after.min())
     beyond = max(top - max(old, new), min(old, new) - bottom)
-    if beyond > 0.01 * abs(old):
-        found["direct_change_N"] = (top if top - max(old, new) == beyond else bottom) - old
+    extreme = top if top - max(old, new) == beyond else bottom
+    lasts = int((np.abs(after - new) > 0.5 * abs(extreme - new)).sum())
+    if beyond > 0.01 * abs(old) and lasts > SAMPLES:  # else it is over between two samples
+        found["direct_change_N"] = extreme - old
     return found
 
 

@@ -22,8 +22,8 @@ from tribo.traces.sliding import transient_end
 
 _DEGREES = (1, 3, 5, 7, 9)  # of the polynomial that takes off the drift of a level: the first that leaves none
 _SLOWEST = 3  # coefficients after it in which drift that is left
-_STANDS_OUT = 3.0  # by this many times the variance of all
-_COSINES = 12  # coefficients after it that tell the noise of its mean
+_STANDS_OUT = 2.3  # by this many times the variance of all
+_COSINES = 8  # coefficients after it that tell the noise of its mean
 _COSINES_OF_ALL = 20  # the same of a whole slide
 _COSINES_OF_STROKE = 4  # the same of a stroke, whose neighbours tell of its noise as well
 _FEWEST = 12  # samples from which on a mean has an interval
