@@ -490,7 +490,8 @@ class SetAside:
 @displayed(lambda d: f"{d.name}: {d.found}")
 @dataclass(frozen=True)
 class Doubt:
-    """A number outside its broad physical bounds, or a design that cannot give the number it is for.
+    """A number outside its broad physical bounds or far from those of equal tests, or a design that cannot give the
+    number it is for.
 
     ``quantity`` is its name for programs, ``name`` that for people; ``found`` and ``plausible`` are texts with units,
     ``place`` is where to look, ``slip`` the question that may explain it, ``source`` where the bounds are from, and
@@ -788,7 +789,7 @@ class Study:
     notes : tuple of str
         What was left out, and what a reader must know of the model runs, as sentences.
     doubts : tuple of Doubt
-        Numbers outside their broad physical bounds.
+        Numbers outside their broad physical bounds, or far from those of equal tests.
     undiagnosed : str
         Why there is no diagnosis.
 

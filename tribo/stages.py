@@ -360,13 +360,15 @@ def naming_set_aside(ingested: Ingested) -> Iterator[None]:
 
 
 def with_doubts(study: Study) -> Study:
-    """The study with the numbers that lie outside their broad physical bounds."""
+    """The study with the numbers that lie outside their broad physical bounds, or far from those of their siblings."""
+    from tribo.fitting.siblings import sibling_doubts
     from tribo.plausibility import doubts_of
 
     fits = study.fits
     with suppress(FitError):
         fits = fits or fit(study.ingested)
-    return replace(study, doubts=doubts_of(study.ingested.campaign, study.ingested, _alone(fits)))
+    bounds = doubts_of(study.ingested.campaign, study.ingested, _alone(fits))
+    return replace(study, doubts=(*sibling_doubts(study.ingested), *bounds))
 
 
 def without_model(campaign: Campaign, options: StudyOptions) -> str:

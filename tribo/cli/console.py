@@ -323,7 +323,7 @@ class Console:
             self.say(f"{len(problems)} problem{'s' if len(problems) != 1 else ''}:\n{lines}", level=-1)
 
     def list_doubts(self, doubts: Sequence[Doubt]) -> None:
-        """Numbers outside their broad physical bounds; shown even with -q, nothing where there are none."""
+        """Doubtful numbers; shown even with -q, nothing where there are none."""
         if doubts:
             number = f"{len(doubts)} doubtful number{'s' if len(doubts) != 1 else ''}"
             self.say(f"{number}:\n{doubts_text(doubts)}", level=-1)

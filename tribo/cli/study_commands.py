@@ -40,7 +40,7 @@ from tribo.cli.study_options import (
     reading_options,
     with_reading_options,
 )
-from tribo.errors import FitError, TriboError, unexpected
+from tribo.errors import FitError, SimulationError, TriboError, unexpected
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
@@ -309,6 +309,12 @@ def _diagnosed(
         return study, _diagnosis(study, chosen, progress)
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}"), undiagnosed=str(why)), None
+    except SimulationError:
+        if study.comparison is not None:
+            raise
+        from tribo.stages import diagnosis_without_model  # the model cannot be run, as the study says
+
+        return study, diagnosis_without_model(study, seed=chosen.seed, kept=chosen.kept)
     except (TriboError, OSError):
         raise
     except Exception as why:  # the other results stand without it
@@ -320,7 +326,7 @@ def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagno
     """With the spring-block model, or, where a study was made without it, without."""
     from tribo.stages import diagnose as diagnosis_with_model, diagnosis_without_model, without_model
 
-    if study.comparison is None or without_model(study.ingested.campaign, chosen):
+    if without_model(study.ingested.campaign, chosen):
         return diagnosis_without_model(study, seed=chosen.seed, kept=chosen.kept)
     return diagnosis_with_model(
         study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress

@@ -89,16 +89,18 @@ CARD_LINES = 8
 
 
 def card_text(card: Card) -> str:
-    """The sentence, the tests, what else to know, what the names mean and the next test, in at most CARD_LINES lines.
+    """Doubts, the sentence, the tests, what else to know, what the names mean and the next test, in CARD_LINES lines.
 
     What does not fit stands in the report. The laws have their own table.
     """
+    others = f" (and {len(card.doubts) - 1} more)" if len(card.doubts) > 1 else ""
+    first = [f"Check first: {card.doubts[0]}{others}"] if card.doubts else []
     last = [] if card.next_test is None else [f"Next test: {card.next_test['line']}"]
     more = [*card.to_know, *(f"{name}: {meaning}" for name, meaning in card.meanings)]
-    room = CARD_LINES - 2 - len(last)
+    room = CARD_LINES - 2 - len(first) - len(last)
     if len(more) > room:
         more = [*more[: room - 1], f"The report has {len(more) - room + 1} further notes."]
-    return "\n".join([card.sentence, card.counts, *more, *last])
+    return "\n".join([*first, card.sentence, card.counts, *more, *last])
 
 
 def verdict_text(v: Verdict) -> str:

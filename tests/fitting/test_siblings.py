@@ -1,0 +1,79 @@
+"""A force far from those of its siblings is a doubt, with one repeat and three specimens as well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tribo
+from tribo.fitting.siblings import sibling_doubts
+from tribo.records import Ingested, Pull
+from tribo.stages import with_doubts
+
+
+@pytest.fixture(scope="module")
+def ingested() -> Ingested:
+    """Six samples, three specimens, four loads, one repeat."""
+    whole = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+    tests = tuple(t for t in whole.campaign.tests if t.repeat == 1)
+    kept = {t.test_id for t in tests}
+    return replace(
+        whole, campaign=replace(whole.campaign, tests=tests),
+        pulls={i: p for i, p in whole.pulls.items() if i in kept},
+        traces={i: t for i, t in whole.traces.items() if i in kept},
+    )  # fmt: skip
+
+
+def times(ingested: Ingested, factors: dict[str, float]) -> Ingested:
+    def one(test_id: str, pull: Pull) -> Pull:
+        factor = factors.get(test_id, 1.0)
+        return replace(pull, static_N=factor * pull.static_N, sliding_N=factor * pull.sliding_N)
+
+    return replace(ingested, pulls={i: one(i, pull) for i, pull in ingested.pulls.items()})
+
+
+def test_a_campaign_without_slips_has_no_doubt(ingested: Ingested) -> None:
+    assert sibling_doubts(ingested) == ()
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.1, 0.5, 2.0, 10.0, 1000.0])
+@pytest.mark.parametrize("place", [0, 17, 40])
+def test_one_pull_that_is_off_is_named_and_no_other(ingested: Ingested, factor: float, place: int) -> None:
+    test_id = list(ingested.pulls)[place]
+    (doubt,) = sibling_doubts(times(ingested, {test_id: factor}))
+    assert f"test {test_id} " in doubt.name
+    assert ("above" if factor > 1 else "below") in doubt.found
+
+
+def test_a_load_with_a_digit_too_many_is_named_at_its_test(ingested: Ingested) -> None:
+    tests = list(ingested.campaign.tests)
+    k = next(k for k, t in enumerate(tests) if abs(t.normal_load_N - 0.505) < 0.01)
+    tests[k] = replace(tests[k], normal_load_N=10 * tests[k].normal_load_N)
+    (doubt,) = sibling_doubts(replace(ingested, campaign=replace(ingested.campaign, tests=tuple(tests))))
+    assert f"test {tests[k].test_id} " in doubt.name
+    assert "a decimal point in the load" in doubt.slip
+
+
+@pytest.mark.parametrize("share", [0.25, 0.4])
+def test_many_exports_in_another_unit_are_one_doubt(ingested: Ingested, share: float) -> None:
+    names = list(ingested.pulls)
+    spoiled = np.random.default_rng(1).permutation(names)[: round(share * len(names))]
+    doubts = sibling_doubts(times(ingested, dict.fromkeys(spoiled, 1e-3)))
+    assert f"friction of {len(spoiled)} of {len(names)} tests" in doubts[0].name
+    assert "a thousand times smaller" in doubts[0].found
+    assert "kilonewtons" in doubts[0].slip
+    assert len(doubts) == 1
+
+
+def test_what_tests_that_are_off_have_in_common_is_said(ingested: Ingested) -> None:
+    first = [t.test_id for t in ingested.campaign.tests if t.specimen in ("A2", "B1", "F3")]
+    (doubt, *_) = sibling_doubts(times(ingested, dict.fromkeys(first, 0.01)))
+    assert "all of specimen A2, B1, F3" in doubt.place
+
+
+def test_every_study_holds_the_doubt(ingested: Ingested) -> None:
+    name = next(iter(ingested.pulls))
+    study = with_doubts(tribo.Study(times(ingested, {name: 100.0})))
+    assert any(f"test {name} " in doubt.name for doubt in study.doubts)

@@ -1,0 +1,248 @@
+"""Forces far from those of their siblings: the other pulls of the same sample, load and specimen.
+
+A number that was typed or read wrongly lies far outside of the scatter of its siblings, also where there is one repeat
+and there are three specimens. It is a doubt, never removed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from tribo.fits import REGIMES
+from tribo.fitting.linear import levels_of
+from tribo.records import Campaign, Doubt, FloatArray, Ingested
+
+CHANCE = 0.005  # of naming any pull of one regime in a campaign whose repeats scatter with the tails below
+TAILS = 6.0  # degrees of freedom of Student's t for the scatter of repeats: one in a thousand is 6 deviations off
+SPREADS = 400  # simulated campaigns of the same design
+LEAST_RATIO = 1.15  # less is not a slip, whatever the scatter
+SPLIT = 5.0  # ratio between equal pulls that no scatter of repeats or specimens gives, and a wrong unit exceeds
+FEWEST_SPLIT, LEAST_SPLIT = 3, 0.25  # cells, and the share of all, that a slip of many exports splits
+MAD_TO_SD = 1.4826
+LOAD_TOLERANCE = 0.02
+MOST_NAMED = 3
+FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
+NEAR = 0.25  # by which a factor may differ from that of a slip, as ln
+
+
+@dataclass(frozen=True)
+class _Pulls:
+    """Pulls of one regime: places in the campaign's order, forces and loads (n,), cells by number (n,)."""
+
+    test_id: np.ndarray
+    sample: np.ndarray
+    specimen: np.ndarray
+    load_N: FloatArray
+    log_force: FloatArray
+    level: np.ndarray
+
+    @property
+    def cell(self) -> np.ndarray:
+        """Pulls of one sample at one load share a number."""
+        names = pd.MultiIndex.from_arrays([self.sample, self.level])
+        return np.asarray(pd.factorize(names)[0])
+
+    @property
+    def body(self) -> np.ndarray:
+        """Pulls of one specimen in one sample share a number."""
+        return np.asarray(pd.factorize(pd.MultiIndex.from_arrays([self.sample, self.specimen]))[0])
+
+
+def sibling_doubts(ingested: Ingested, *, seed: int = 0) -> tuple[Doubt, ...]:
+    """A doubt for every pull, and for every group of pulls, whose forces are far from those of its siblings.
+
+    Parameters
+    ----------
+    ingested : Ingested
+        Pulls with their tests.
+    seed : int
+        Draws the campaigns of the same design from which it is known how far chance goes.
+    """
+    campaign, table = ingested.campaign, ingested.table()
+    found: dict[str, dict[str, tuple[float, float, float]]] = {}
+    doubts: list[Doubt] = []
+    groups: list[tuple[set[str], float, list[str]]] = []
+    for regime in REGIMES if len(table) else ():
+        pulls = _pulls_of(table, regime)
+        if len(pulls.log_force) < 6:
+            continue
+        apart, log_factor = _split(pulls)
+        if apart.any():
+            names = set(pulls.test_id[apart].tolist())
+            same = [group for group in groups if abs(group[1] - log_factor) < NEAR and group[0] & names]
+            if same:
+                same[0][0].update(names)
+                same[0][2].append(regime)
+            else:
+                groups.append((names, log_factor, [regime]))
+        mended = pulls.log_force - np.where(apart, log_factor, 0.0)
+        for k, deviation, reach in _far(pulls, mended, seed):
+            if not apart[k]:
+                expected = float(np.exp(pulls.log_force[k] - deviation))
+                found.setdefault(str(pulls.test_id[k]), {})[regime] = (deviation, expected, reach)
+    for names, log_factor, regimes in groups:
+        doubts.append(_of_group(campaign, sorted(names), log_factor, regimes, len(table)))
+    order = sorted(found, key=lambda name: -max(abs(d) for d, _, _ in found[name].values()))
+    return (*doubts, *(_of_pull(ingested, name, found[name]) for name in order))
+
+
+def _pulls_of(table: pd.DataFrame, regime: str) -> _Pulls:
+    rows = table[(table[f"{regime}_N"] > 0) & (table["normal_load_N"] > 0)]
+    load = rows["normal_load_N"].to_numpy(float)
+    return _Pulls(
+        rows["test_id"].to_numpy(str), rows["sample"].to_numpy(str), rows["specimen"].to_numpy(str), load,
+        np.log(rows[f"{regime}_N"].to_numpy(float)), pd.factorize(levels_of(load, LOAD_TOLERANCE))[0],
+    )  # fmt: skip
+
+
+def _split(pulls: _Pulls) -> tuple[np.ndarray, float]:
+    """The smaller part of the pulls, (n,) of bool, where many cells fall into two parts, and ln of its factor."""
+    low, high = np.zeros((2, len(pulls.log_force)), bool)
+    factors, several = [], 0
+    for cell in range(pulls.cell.max() + 1):
+        rows = np.flatnonzero(pulls.cell == cell)
+        several += len(rows) > 1
+        order = rows[np.argsort(pulls.log_force[rows])]
+        steps = np.diff(pulls.log_force[order])
+        if len(rows) > 1 and steps.max() > math.log(SPLIT):
+            at = int(np.argmax(steps)) + 1
+            low[order[:at]], high[order[at:]] = True, True
+            factors.append(pulls.log_force[order[at:]].mean() - pulls.log_force[order[:at]].mean())
+    if len(factors) < max(FEWEST_SPLIT, LEAST_SPLIT * several):
+        return np.zeros(len(low), bool), 0.0
+    factor = float(np.median(factors))
+    either = []
+    for part, log_factor in ((low, -factor), (high, factor)):
+        beside = _beside_law(pulls, pulls.log_force - np.where(part, log_factor, 0.0))
+        whole_cells = np.abs(beside - log_factor) < NEAR
+        either.append((part | whole_cells, log_factor))
+    return min(either, key=lambda found: int(found[0].sum()))
+
+
+def _far(pulls: _Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, float, float]]:
+    """Place, deviation of ln T from the siblings, and the deviation that chance reaches, of each pull beyond it."""
+    left = _from_siblings(pulls, _beside_law(pulls, log_force)[:, None])[:, 0]
+    rng = np.random.default_rng(seed)
+    drawn = _from_siblings(pulls, rng.standard_t(TAILS, (len(left), SPREADS)))
+    spread = _spread(pulls, left[:, None])[:, 0]
+    if not (spread > 0).any():
+        return
+    limit = float(np.quantile((np.abs(drawn) / _spread(pulls, drawn)).max(axis=0), 1.0 - CHANCE))
+    for k in np.flatnonzero(np.abs(left) > np.maximum(limit * spread, math.log(LEAST_RATIO))):
+        yield int(k), float(left[k]), float(limit * spread[k])
+
+
+def _beside_law(pulls: _Pulls, log_force: FloatArray) -> FloatArray:
+    """ln T less that of a straight line T = mu N + T0 of its sample, by repeated medians (Siegel 1982), shape (n,)."""
+    left = np.empty_like(log_force)
+    for sample in np.unique(pulls.sample):
+        rows = np.flatnonzero(pulls.sample == sample)
+        x, ratio = 1.0 / pulls.load_N[rows], np.exp(log_force[rows]) / pulls.load_N[rows]
+        apart = x[:, None] - x[None, :]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slopes = np.where(apart != 0, (ratio[:, None] - ratio[None, :]) / apart, np.nan)
+        known = np.isfinite(slopes).any(axis=1)
+        slope = float(np.median(np.nanmedian(slopes[known], axis=1))) if known.any() else 0.0
+        line = slope * x + np.median(ratio - slope * x)
+        level = np.log(line * pulls.load_N[rows]) if (line > 0).all() else np.median(log_force[rows])
+        left[rows] = log_force[rows] - level
+    return left
+
+
+def _from_siblings(pulls: _Pulls, values: FloatArray) -> FloatArray:
+    """Values, shape (n, m), less the medians of their cells and specimens of three pulls or more (Tukey's polish)."""
+    left = values - np.median(values, axis=0)
+    for _ in range(3):
+        for kinds in (pulls.cell, pulls.body):
+            for kind in range(kinds.max() + 1):
+                rows = np.flatnonzero(kinds == kind)
+                if len(rows) > 2:
+                    left[rows] -= np.median(left[rows], axis=0)
+    return left
+
+
+def _spread(pulls: _Pulls, left: FloatArray) -> FloatArray:
+    """Robust standard deviation at each pull, shape (n, m): of the whole campaign, or of its load where that is larger.
+
+    The smaller half of what a polish leaves is near zero: the 75 % quantile of the absolute values is taken.
+    """
+    size = np.abs(left)
+    quantile = 1.15  # of a normal deviate, that three quarters of the absolute values are below
+    spread = np.broadcast_to(np.quantile(size, 0.75, axis=0) / quantile, size.shape).copy()
+    for level in range(pulls.level.max() + 1):
+        rows = np.flatnonzero(pulls.level == level)
+        if len(rows) >= 6:
+            spread[rows] = np.maximum(spread[rows], np.quantile(size[rows], 0.75, axis=0) / quantile)
+    return spread
+
+
+def _times(log_factor: float) -> str:
+    """"a hundred times" or "1.6 times"."""
+    factor = math.exp(abs(log_factor))
+    near = next((words for f, words in FACTORS.items() if abs(math.log(factor / f)) < NEAR), f"{factor:.2g}")
+    return f"{near} times"
+
+
+def _slip(log_factor: float, *, group: bool) -> str:
+    factor = math.exp(abs(log_factor))
+    smaller = log_factor < 0
+    if abs(math.log(factor / 1000.0)) < NEAR:
+        return "the forces are in " + ("kilonewtons" if smaller else "millinewtons") + ": state the unit in [columns]?"
+    if group and abs(math.log(factor / 9.80665)) < NEAR / 5:
+        unit = "kilogram-force" if smaller else "another unit"
+        return f"the forces are in {unit}: state the unit in [columns]?"
+    if abs(math.log(factor / 101.97)) < NEAR and not smaller:
+        return "the forces are in gram-force: state the unit in [columns]?"
+    if any(abs(math.log(factor / f)) < NEAR for f in (10.0, 100.0)):
+        return "a decimal point in the load or in the force, or another range of the load cell?"
+    return "another load, another specimen or another sample than stated, or a damaged record?"
+
+
+def _of_pull(ingested: Ingested, test_id: str, by_regime: Mapping[str, tuple[float, float, float]]) -> Doubt:
+    """The doubt about one pull, in the regime in which it is farther."""
+    regime = max(by_regime, key=lambda name: abs(by_regime[name][0]))
+    deviation, expected, reach = by_regime[regime]
+    test = next(t for t in ingested.campaign.tests if t.test_id == test_id)
+    force = expected * math.exp(deviation)
+    low, high = expected * math.exp(-reach), expected * math.exp(reach)
+    way = "above" if deviation > 0 else "below"
+    size = f"{100 * abs(math.expm1(deviation)):.0f} %" if abs(deviation) < math.log(3) else _times(deviation)
+    also = "" if len(by_regime) == 1 else ", and the other force as well"
+    where = f"{test.file}" if test.file else "tests.csv"
+    return Doubt(
+        "siblings", f"{regime} friction of test {test_id} ({test.sample} at {test.normal_load_N:.3g} N)",
+        f"{force:.3g} N, {size} {way} its siblings{also}", f"{low:.3g} to {high:.3g} N", f"tests.csv, {where}",
+        _slip(deviation, group=False),
+    )  # fmt: skip
+
+
+def _of_group(
+    campaign: Campaign, test_ids: Sequence[str], log_factor: float, regimes: Sequence[str], tests: int
+) -> Doubt:
+    """The doubt about many pulls that are off by one factor, with what they have in common."""
+    way = "larger" if log_factor > 0 else "smaller"
+    more = f" and {len(test_ids) - MOST_NAMED} more" if len(test_ids) > MOST_NAMED else ""
+    named = f"{', '.join(test_ids[:MOST_NAMED])}{more}{_in_common(campaign, test_ids)}"
+    return Doubt(
+        "siblings", f"{' and '.join(regimes)} friction of {len(test_ids)} of {tests} tests",
+        f"about {_times(log_factor)} {way} than that of equal tests", "one unit and one range for all exports",
+        f"tests {named}", _slip(log_factor, group=True),
+    )  # fmt: skip
+
+
+def _in_common(campaign: Campaign, test_ids: Sequence[str]) -> str:
+    """" (all of 2026-03-04)": the value of a column that these tests have and no other test."""
+    chosen = set(test_ids)
+    for name in ("started_at", "operator", "specimen", "sample", "repeat"):
+        end = 10 if name == "started_at" else None
+        values = [(t.test_id in chosen, str(getattr(t, name, "") or "")[:end]) for t in campaign.tests]
+        inside, outside = ({v for own, v in values if own == side} for side in (True, False))
+        if inside and not inside & outside and "" not in inside and len(inside) <= MOST_NAMED:
+            words = {"started_at": "day", "repeat": "repeat"}.get(name, name)
+            return f", all of {words} {', '.join(sorted(inside))}"
+    return ""
