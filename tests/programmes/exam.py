@@ -28,6 +28,7 @@ CLASS = {
 BETWEEN = ("step", "turn")  # phases that may be as short as no time
 SAMPLES = 3
 SHARE = 0.01
+TURN = 0.06  # share of a stroke that a reversal which holds the true one may take: a crank turns slowly
 
 
 @dataclass
@@ -109,6 +110,8 @@ def _boundaries(seen: Seen, record: Record, file: Path) -> None:
         hits = [
             abs(t - at) <= within and a in (one[0], *BETWEEN) and b in (other[0], *BETWEEN) for a, b, t in found
         ]
+        turns = [(b, e) for name, b, e in merged if name == "turn" and b <= at <= e and e - b <= TURN * longest]
+        hits = [hit or any(t in turn for turn in turns) for hit, (_, _, t) in zip(hits, found, strict=True)]
         near = [old or new for old, new in zip(near, hits, strict=True)]
         if record.told:
             seen.boundaries += 1

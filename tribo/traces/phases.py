@@ -71,6 +71,7 @@ _AT_BEGINNING = 0.1  # share of a record up to which sliding that is stated begi
 BY_HAND = "stated by hand"
 _OF_DRIVE = ("hold", "end of the drive", "stroke", "reversal")  # phases that a channel of the drive tells of
 _GAP = 10.0  # usual steps of the time between two samples from which on rows are missing
+_LATE = 0.01  # share of a stroke by which the force may tell late that its drive has stopped
 _WAITS = 0.1  # share of a stroke for which a drive stands still at its end that does more than turn
 _LEFT = 0.2  # share of the way to the other level from which on a force has left the old one
 _DRIFTS = 0.02  # share of the later force by which the force before it differs at the least where it still runs in,
@@ -128,8 +129,9 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
         at_once = bool(moving[max(contact[0] - 2, 0) : contact[0] + 2].all())
     elif moving is None or not begins_at_rest:
         turns = contact_kind in TURNING or (drive is not None and drive.channel in ("speed", "rotation speed"))
-        at_once = _returns(signal, touching)
-        at_once = at_once or _begins_high(signal, touching, turns=turns, told=turns and moving is not None)
+        even = _over_load(trace, signal, contact)
+        at_once = _returns(even, touching)
+        at_once = at_once or _begins_high(even, touching, turns=turns, told=turns and moving is not None)
     else:
         at_once = False
     told = None
@@ -153,12 +155,15 @@ def course_of_piece(trace: Trace, signal: Signal, *, starts_sliding: bool) -> Co
     """The course of a piece that was cut from a record: it ends where its drive stops."""
     whole, drive = (0, signal.time_s.size), drive_of(trace)
     if drive is not None and drive.moving.any():
-        end = int(np.flatnonzero(drive.moving)[-1]) + 1
+        starts, ends = runs_of(drive.moving)
+        if ends.size > 1 and ends[-1] - starts[-1] < _WAITS * (ends - starts).max():  # it sets out on the next stroke
+            ends = ends[:-1]
+        end = int(ends[-1])
         end = end if whole[1] - end >= FEWEST_AT_REST else whole[1]
     else:
         held = _before_it_turns(signal.calm_N)
         end = stands_from(signal.force_N[:held])
-        end = end if end < held else whole[1]
+        end = max(end - int(_LATE * held), 1) if end < held else whole[1]
     return Course(whole, end, (), (), starts_sliding)
 
 
