@@ -88,7 +88,8 @@ def test_motor_oil_has_the_mean_torque_of_its_window_over_the_lever() -> None:
         slides = (time >= pull.window_s[0]) & (time <= pull.window_s[1])
         assert (turns[slides] > 0.5).mean() > 0.98  # the recorded turns are noisy
         by_column = torque[slides].mean() / arm
-        assert pull.sliding_N == pytest.approx(abs(by_column), rel=SLIDING), file.name
+        friction = abs(by_column - torque[-100:].mean() / arm)  # above the torque at rest at the end
+        assert pull.sliding_N == pytest.approx(abs(by_column), abs=SLIDING * friction), file.name
 
 
 def test_alloy_strokes_have_half_the_difference_of_both_directions() -> None:

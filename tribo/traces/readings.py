@@ -39,6 +39,7 @@ _LONGEST_TAU = 0.3  # share of a slide and of one that is over at the most
 _ARRIVED = 0.1  # share of the whole change that is left where running-in counts as over
 _SURE = 0.975  # probability on either side with which a drift is told
 _FEWEST_HOLDS = 3
+_RESOLVED = 5  # samples in which a change at once comes half-way down at the least, so that its size is told
 _ABOVE_NOISE = 1.5  # times the largest departure of the later half by which a force goes beyond both levels at a step
 
 
@@ -239,9 +240,9 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
     if -min(below) < _ABOVE_NOISE * float(np.abs(late - np.median(late)).max()) or height[at] <= 0:
         return None
     lower = np.flatnonzero(height[at:] < 0.5 * height[at])
-    half = max(int(lower[0]) if lower.size else 0, 3)
+    half = int(lower[0]) if lower.size else 0
     part = force[at : at + 6 * half]
-    if part.size < 2 * _FEWEST:
+    if half < _RESOLVED or part.size < 2 * _FEWEST:
         return None
     along = np.arange(part.size, dtype=float)
     fits = []
@@ -254,7 +255,8 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
     variance = max(variance, squares / (part.size - 3))
     near = [value for other, value, _ in fits if other <= squares + 4.0 * variance]
     leverage = float(np.linalg.pinv(design.T @ design).sum())
-    u = math.sqrt(variance * leverage + ((max(near) - min(near)) / 4.0) ** 2)
+    placed = squares / (part.size - 3)  # the noise of a sample says which one is the extreme
+    u = math.sqrt(variance * leverage + ((max(near) - min(near)) / 4.0) ** 2 + placed)
     return _about(top - old, 2.2 * u, _half(one.mean))
 
 
