@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -260,7 +262,7 @@ def doubts_of(campaign: Campaign, ingested: Ingested | None = None, fits: Sequen
     found = [doubt for q, by in numbers.items() if (doubt := _outside(campaign, q, by, _PLACES[q], slip)) is not None]
     if not slip:  # one that explains the loads or the area explains these as well
         found += [*_wide_pitches(campaign), *_load_span(campaign)]
-    return (*found, *_stated(campaign), *_geometry(campaign))
+    return (*found, *_stated(campaign), *_geometry(campaign), *_names(campaign), *_sled(campaign), *_order(campaign))
 
 
 def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawFit]) -> Numbers:
@@ -343,10 +345,62 @@ def _stated(campaign: Campaign) -> Iterator[Doubt]:
         question = next((slip(v) for v in by.values() if not bound.low <= v <= bound.high), "")
         if doubt := _outside(campaign, quantity, by, _PLACES[quantity], f"{question}?" if question else ""):
             yield doubt
-    if damp and 0 < max(damp.values()) <= 1:
-        found = f"at most {max(damp.values()):g}"
+    fractions = [v for v in damp.values() if 0 < v <= 1]
+    if fractions:
+        of = "" if len(fractions) == len(damp) else f" in {len(fractions)} of {len(damp)} tests"
+        found = f"at most {max(fractions):g}{of}"
         fraction = "humidity_pct looks like a fraction: multiply by 100?"
         yield Doubt("humidity_pct", _NAMES["humidity_pct"], found, "1 to 100", _PLACES["humidity_pct"], fraction)
+
+
+def _names(campaign: Campaign) -> Iterator[Doubt]:
+    """Names that differ in case, blanks or the coding of letters, and specimens of two patterns."""
+    for column in ("sample", "specimen", "operator"):
+        spellings: dict[str, set[str]] = {}
+        for name in {str(getattr(t, column)) for t in campaign.tests} - {""}:
+            alike = "".join(unicodedata.normalize("NFKC", name).casefold().split())
+            spellings.setdefault(alike, set()).add(name)
+        for names in (sorted(names) for names in spellings.values() if len(names) > 1):
+            found = " and ".join(map(ascii if len({*map(str.casefold, names)}) > 1 else repr, names))
+            slip = "the same one, spelled differently"
+            yield Doubt("names", f"a {column}", found, "one spelling", f"{_TABLE}, column {column}", f"{slip}?")
+    patterns: dict[str, set[str]] = {}
+    for test in campaign.tests:
+        if test.specimen and test.sample in campaign.samples:
+            patterns.setdefault(test.specimen, set()).add(campaign.samples[test.sample].name)
+    several = {name: found for name, found in patterns.items() if len(found) > 1}
+    if several and len(several) < len(patterns):  # where all are, specimens are numbered anew in each sample
+        found = _listed([f"{name} ({' and '.join(sorted(found))})" for name, found in sorted(several.items())])
+        yield Doubt("names", "a specimen of two patterns", found, "one pattern each", f"{_TABLE}, column specimen")
+
+
+def _sled(campaign: Campaign) -> Iterator[Doubt]:
+    """What is not stated of a sled, and changes its numbers: the mass of the slider, and which specimen was pulled."""
+    if not campaign.slider_mass_stated and any(t.load_from == "mass_g" for t in campaign.tests):
+        slip = "weigh sled and sample without the added mass; if mass_g holds them, state slider_mass_g = 0"
+        found, place = "not stated, and taken as 0 g", f"{_TOML}, slider_mass_g"
+        yield Doubt("slider_mass_g", "the mass of the slider", found, "a mass in g, or 0", place, slip)
+    cells = [(t.sample, round(t.normal_load_N, 9)) for t in campaign.tests]
+    if cells and len(cells) > len(set(cells)) and not any(t.specimen for t in campaign.tests):
+        slip = "without it, pulls of one specimen count as of one body, and uncertainties may be too small"
+        place = f"{_TABLE}, column specimen"
+        yield Doubt("specimen", "the specimen of each test", "not stated", "a name for each", place, slip)
+
+
+def _order(campaign: Campaign) -> Iterator[Doubt]:
+    """Places in a series that are all one, below zero, or in another order than the times."""
+    order = {t.test_id: t.run_order for t in campaign.tests if t.run_order is not None}
+    place = f"{_TABLE}, column run_order"
+    if len(order) > 2 and len(set(order.values())) == 1:
+        yield Doubt("run_order", "run order", f"{next(iter(order.values()))} in every test", "one number a test", place)
+    elif order and min(order.values()) < 0:
+        yield Doubt("run_order", "run order", f"{min(order.values())}", "0 or more", place)
+    timed = [t for t in campaign.tests if t.run_order is not None and len(t.started_at) > 10]
+    by_time = sorted(timed, key=lambda t: t.started_at)
+    wrong = [b for a, b in pairwise(by_time) if a.started_at < b.started_at and a.run_order > b.run_order]
+    if len(set(order.values())) > 1 and wrong:
+        found = f"{len(wrong)} of {len(timed)} tests against their times ({_listed([t.test_id for t in wrong])})"
+        yield Doubt("run_order", "run order", found, "the order of started_at", f"{place} and started_at")
 
 
 def _wide_pitches(campaign: Campaign) -> Iterator[Doubt]:

@@ -537,6 +537,8 @@ class Campaign:
         The two materials in contact, as stated.
     slider_mass_kg : float
         Mass of the slider in kg without the weights put on it.
+    slider_mass_stated : bool
+        Whether campaign.toml states that mass, be it 0.
     pull_speed_m_s : float, optional
         Pull speed in m/s of tests that state none.
     set_aside : tuple of SetAside
@@ -596,6 +598,7 @@ class Campaign:
     measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     viscosity_Pa_s: float | None = None
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
+    slider_mass_stated: bool = True
 
     @property
     def has_area(self) -> bool:

@@ -90,7 +90,7 @@ class CampaignTable(_Strict):
     nominal_area_mm2: Positive | None = None
     contact: Literal["", "sled", "pin_on_disc", "ball_on_disc", "ring_shear", "reciprocating", "rotary"] = ""
     material_class: Literal["", "elastomer", "polymer", "metal", "ceramic", "lubricated", "granular"] = ""
-    slider_mass_g: NotNegative = 0.0
+    slider_mass_g: NotNegative | None = None
     pull_speed_mm_s: Positive | None = None
     viscosity_mPa_s: Positive | None = None
     sign: Literal[1, -1] | None = None

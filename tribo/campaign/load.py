@@ -147,7 +147,8 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         samples={name: patterns[pattern_of(name, patterns)] for name in names},
         material=general.material,
         counterface=general.counterface,
-        slider_mass_kg=general.slider_mass_g * _GRAM,
+        slider_mass_kg=(general.slider_mass_g or 0.0) * _GRAM,
+        slider_mass_stated=general.slider_mass_g is not None,
         pull_speed_m_s=None if general.pull_speed_mm_s is None else general.pull_speed_mm_s * _MM,
         set_aside=set_aside,
         problems=tuple(problems),
@@ -210,7 +211,7 @@ def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float | No
     if load is None and stress is not None and area_m2 is not None:
         load = stress * area_m2
     if load is None:
-        load = math.nan if mass is None else (mass + general.slider_mass_g) * _GRAM * STANDARD_GRAVITY
+        load = math.nan if mass is None else (mass + (general.slider_mass_g or 0.0)) * _GRAM * STANDARD_GRAVITY
     speed_m_s = None if speed is None else speed * _MM
     sample = cells["sample"]
     stated = {
@@ -285,7 +286,7 @@ def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:
     mass, load = number(row, "mass_g"), number(row, "normal_load_N")
     if mass is None or load is None:
         return None
-    weight = (mass + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
+    weight = (mass + (described.campaign.slider_mass_g or 0.0)) * _GRAM * STANDARD_GRAVITY
     if abs(weight / load - 1.0) < _LOADS_AGREE:
         return None
     what, found = "this load is used, although it differs from the weight of mass_g and slider", f"{load:g} N"
