@@ -395,11 +395,11 @@ def _order(campaign: Campaign) -> Iterator[Doubt]:
         yield Doubt("run_order", "run order", f"{next(iter(order.values()))} in every test", "one number a test", place)
     elif order and min(order.values()) < 0:
         yield Doubt("run_order", "run order", f"{min(order.values())}", "0 or more", place)
-    timed = [t for t in campaign.tests if t.run_order is not None and len(t.started_at) > 10]
-    by_time = sorted(timed, key=lambda t: t.started_at)
-    wrong = [b for a, b in pairwise(by_time) if a.started_at < b.started_at and a.run_order > b.run_order]
+    timed = sorted((t.started_at, order[t.test_id], t.test_id) for t in campaign.tests if t.test_id in order)
+    timed = [row for row in timed if len(row[0]) > 10]
+    wrong = [name for (before, a, _), (at, b, name) in pairwise(timed) if before < at and a > b]
     if len(set(order.values())) > 1 and wrong:
-        found = f"{len(wrong)} of {len(timed)} tests against their times ({_listed([t.test_id for t in wrong])})"
+        found = f"{len(wrong)} of {len(timed)} tests against their times ({_listed(wrong)})"
         yield Doubt("run_order", "run order", found, "the order of started_at", f"{place} and started_at")
 
 

@@ -62,4 +62,5 @@ def fitted(x: FloatArray, y: FloatArray, noise: float) -> Surrogate:
     best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}).x
     inverse = np.linalg.inv(covariance(best))
     weights = inverse @ left
-    return Surrogate(x, trend, np.exp(best[:-1]), weights, float(np.sqrt(np.mean((weights / np.diag(inverse)) ** 2))))
+    left_out = float(np.sqrt(np.mean((weights / np.diag(inverse)) ** 2)))
+    return Surrogate(x, np.asarray(trend, float), np.exp(best[:-1]), weights, left_out)

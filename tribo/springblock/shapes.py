@@ -55,7 +55,7 @@ def touching_share(
 
 def overlaps(n: int, spacing: float, start: float, pixels: int, pixel: float) -> FloatArray:
     """Share of block i that lies on pixel j of a row that repeats, shape (n, pixels)."""
-    edges = start + spacing * np.arange(n + 1)
+    edges = start + spacing * np.arange(n + 1, dtype=float)
     period = pixels * pixel
 
     def upto(x: FloatArray) -> FloatArray:
@@ -72,10 +72,10 @@ def covered(pattern: Pattern, nx: int, ny: int, spacing: float, x0: float, y0: f
     distance = distance_of(pattern)
     n = max(FEWEST_POINTS, math.ceil(spacing / FINEST_M))
     step = spacing / n
-    x = (np.arange(nx * n) + 0.5) * step - x0
+    x = (np.arange(nx * n, dtype=float) + 0.5) * step - x0
     share = np.empty((ny, nx))
     for row in range(ny):
-        y = (row * n + np.arange(n) + 0.5) * step - y0
+        y = (row * n + np.arange(n, dtype=float) + 0.5) * step - y0
         points = np.clip(0.5 - distance(x[None, :], y[:, None]) / step, 0.0, 1.0)
         share[row] = points.reshape(n, nx, n).mean(axis=(0, 2))
     return share

@@ -180,9 +180,9 @@ def bound_slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, ste
 def energy_of_bonds(p: Planes, inside: NDArray[np.int64], elapsed: float) -> float:
     """Energy in the bonds; that of a sliding block is stretched by its friction."""
     k = p.bond[inside]
-    stretch = [
-        bond_force(k, frame[inside], q[inside], anchor[inside], elapsed)  # type: ignore[arg-type]
+    x, y = (
+        np.asarray(bond_force(k, frame[inside], q[inside], anchor[inside], elapsed))  # type: ignore[arg-type]
         for frame, q, anchor in ((p.frame_x, p.q_x, p.anchor_x), (p.frame_y, p.q_y, p.anchor_y))
-    ]
-    force: FloatArray = np.where(p.pace[inside] > 0.0, p.sliding[inside], np.hypot(*stretch))
+    )
+    force: FloatArray = np.where(p.pace[inside] > 0.0, p.sliding[inside], np.hypot(x, y))
     return float(0.5 * (force[k > 0.0] ** 2 / k[k > 0.0]).sum())
