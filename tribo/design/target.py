@@ -15,12 +15,6 @@ from tribo.errors import Problem, SimulationError
 from tribo.files import text_of
 from tribo.input_files import LARGEST_DESCRIPTION_BYTES, read_input
 
-MISSING_IN_MODEL = {
-    "film": "a film between the surfaces", "lubricant": "a lubricant", "wet": "wetting", "water": "wetting",
-    "humidity": "humidity", "suction": "suction in cavities", "height": "heights of asperities or pillars",
-    "depth": "the depth of cavities", "roughness": "roughness of the surfaces", "indentation": "indentation",
-    "wear": "wear", "temperature": "temperature",
-}  # fmt: skip
 Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 Span = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 Direction = Literal["x", "y", "all"]
@@ -164,11 +158,10 @@ def read_target(path: Path) -> Target:
         ) from why  # fmt: skip
     missing = [
         Problem(
-            "not_in_model", f"the model does not contain {what}; no pattern can be designed for it", file=file,
+            "not_in_model", "the model does not contain this; no pattern can be designed for it", file=file,
             column="needs", found=need, allowed="dry friction of a flat patterned surface: loads, directions, patterns",
         )
         for need in found.needs
-        for word, what in [next(((w, t) for w, t in MISSING_IN_MODEL.items() if w in need.lower()), ("", "this"))]
     ]  # fmt: skip
     if missing:
         raise SimulationError(missing)
