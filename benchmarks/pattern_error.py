@@ -22,8 +22,8 @@ import numpy as np
 
 from tribo.diagnostics.predictor import TabledPattern, interpolated_shares
 from tribo.records import REGIMES, FloatArray
+from tribo.springblock.calibration import simulated_law
 from tribo.springblock.config import PAPER_PRESSURES_PA
-from tribo.springblock.ensemble_laws import simulated_law
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tribo.files import write_text
+from tribo.springblock.calibration import fitted
 from tribo.springblock.config import SimConfig
 from tribo.springblock.ensemble import angle_range_deg
-from tribo.springblock.ensemble_laws import fitted
+from tribo.springblock.kept_runs import versions
 from tribo.springblock.lattice import UM, pattern_of
-from tribo.springblock.results_file import versions
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,7 +21,7 @@ import pandas as pd
 import pattern_error
 from pattern_laws import KEPT, origin, pattern_laws, write_table
 
-from tribo.berardo2019.table2 import table2_design
+from tribo.berardo2019.published_tables import table2_design
 from tribo.cache.kept_results import sources
 from tribo.diagnostics.predictor import flat_law, simulated_patterns
 from tribo.springblock import run_stored

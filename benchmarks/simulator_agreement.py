@@ -33,7 +33,7 @@ from tribo.springblock import SimConfig, simulate
 from tribo.springblock.engines import reference as r
 from tribo.springblock.engines.fast import integrate as run_fast
 from tribo.springblock.engines.reference import integrate as run_reference
-from tribo.springblock.engines.start import Trajectory, drive_of, first_failure_s, lattice_of, thresholds_of
+from tribo.springblock.engines.state import Trajectory, drive_of, first_failure_s, lattice_of, thresholds_of
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 from support.energy_balance import energy_balance

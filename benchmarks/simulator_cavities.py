@@ -23,7 +23,7 @@ from tribo.records import FloatArray
 from tribo.springblock import SimConfig
 from tribo.springblock.engines.fast import integrate as run_fast
 from tribo.springblock.engines.jit import compiled
-from tribo.springblock.engines.start import drive_of, first_failure_s, lattice_of, thresholds_of
+from tribo.springblock.engines.state import drive_of, first_failure_s, lattice_of, thresholds_of
 from tribo.springblock.engines.strips import last_stretch
 from tribo.springblock.lattice import Lattice
 from tribo.springblock.run import run_of

@@ -25,15 +25,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tribo.berardo2019.published_tables import load_table2
-from tribo.berardo2019.table2 import beside, table2_design
+from tribo.berardo2019.published_tables import beside, load_table2, table2_design
 from tribo.records import FloatArray, Run
 from tribo.springblock import SimConfig, read_stored, simulate, stratified_design
-from tribo.springblock.calibration import expected_minimum
+from tribo.springblock.calibration import expected_minimum, fitted, means
 from tribo.springblock.config import PAPER, PAPER_PRESSURES_PA, PAPER_SAMPLES
-from tribo.springblock.engines.start import lattice_of, thresholds_of
+from tribo.springblock.engines.state import lattice_of, thresholds_of
 from tribo.springblock.ensemble import run_row
-from tribo.springblock.ensemble_laws import fitted, means
 
 READING = SimConfig().of_reading("berardo2019")
 REGIMES = ("static", "sliding")

@@ -18,10 +18,9 @@ from pathlib import Path
 
 from table2_readings import combinations, run_study, study_designs
 
-from tribo.berardo2019.published_tables import load_table2
-from tribo.berardo2019.table2 import beside, distance
+from tribo.berardo2019.published_tables import beside, distance, load_table2
 from tribo.springblock import SimConfig, read_stored
-from tribo.springblock.ensemble_laws import fitted
+from tribo.springblock.calibration import fitted
 
 BASE = SimConfig(dt_s=1e-7, rest_tolerance=1e-2)
 

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tribo.records import FloatArray, Run
+from tribo.springblock.calibration import WEIGHTS, resampled_laws
 from tribo.springblock.config import PAPER_SAMPLES, SimConfig
 from tribo.springblock.ensemble import Angles, Progress, Work, stratified_design
-from tribo.springblock.ensemble_laws import WEIGHTS, resampled_laws
 from tribo.springblock.kept_runs import run_stored
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from support.sled import SledDesign, SledLaw, SledTribometer, write_campaign
 
 from tribo.cli.commands import main
-from tribo.report.demo_page import write_demo_page
+from tribo.report.without_study import write_demo_page
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example"
 SECOND_EXAMPLE = EXAMPLE.parent / "second_example"

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tribo.campaign.description import PatternTable
-from tribo.springblock.shapes import touching_share
+from tribo.springblock.lattice import touching_share
 
 FAMILIES = {
     "circle, square lattice": {"cavity": "circle", "diameter_um": 12, "pitch_um": 20},

@@ -10,7 +10,7 @@ from on_the_command_line import run
 
 from tribo.diagnostics.verdict import Estimate
 from tribo.lawsearch.grammar import Shape, WrittenLaw
-from tribo.lawsearch.law_file import law_text
+from tribo.lawsearch.known_laws import law_text
 
 SIZE = {"a": Estimate(0.7, 0.6, 0.8, "")}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.comparison.agreement import welch_dof
+from tribo.comparison.findings import welch_dof
 
 
 def test_degrees_of_freedom_join_by_welch_and_satterthwaite() -> None:

@@ -15,10 +15,9 @@ from tribo.campaign.description import PatternTable
 from tribo.campaign.geometry import Making, faults_of_making
 from tribo.cli import main
 from tribo.design import rounds
-from tribo.design.masks import polygons_um, repeat_um
-from tribo.design.space import Space
-from tribo.design.surrogate import fitted
-from tribo.design.target import Family, read_target
+from tribo.design.answer_files import polygons_um, repeat_um
+from tribo.design.rounds import fitted
+from tribo.design.target import Family, Space, read_target
 from tribo.errors import SimulationError
 from tribo.units import CAMPAIGN_COLUMNS
 

@@ -10,9 +10,8 @@ from blind.bench import Bench, Design
 from blind.direct import ingested
 from blind.tribometer import hide
 
-from tribo.diagnostics.days_and_drift import place_in_series, session_of, walks
 from tribo.diagnostics.diagnosis import Diagnosis, examine
-from tribo.diagnostics.observations import observe
+from tribo.diagnostics.observations import observe, place_in_series, session_of, walks
 from tribo.wording.verdict_sentences import worded
 
 SIZE = 0.06  # of ln T, root mean square

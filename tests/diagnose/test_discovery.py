@@ -31,8 +31,7 @@ from tribo.lawsearch.grammar import (
     scopes_of,
     shapes_of,
 )
-from tribo.lawsearch.known_laws import validate_law, why_not_testable
-from tribo.lawsearch.law_file import law_text, read_law
+from tribo.lawsearch.known_laws import law_text, read_law, validate_law, why_not_testable
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.lawsearch.search import RESCORED, Discovery, best_of, discover_laws

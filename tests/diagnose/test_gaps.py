@@ -16,7 +16,7 @@ from tribo.diagnostics.gaps import gaps_of
 from tribo.diagnostics.model import Acting, setup
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.diagnostics.recorded_in_part import recorded_in_part
+from tribo.diagnostics.score_statistics import recorded_in_part
 from tribo.figures.extended_model import law_numbers_of
 from tribo.lawsearch.grammar import Shape, WrittenLaw, shapes_of
 from tribo.lawsearch.model_choice import FoundLaw

@@ -17,8 +17,7 @@ from tribo.errors import CampaignError, SimulationError
 from tribo.lawsearch import model_choice
 from tribo.lawsearch.diagnosis_with_laws import with_laws, without_causes
 from tribo.lawsearch.grammar import Shape, WrittenLaw
-from tribo.lawsearch.known_laws import plan_law, read_laws, validate_law, validate_laws
-from tribo.lawsearch.law_file import KnownLaw, law_text
+from tribo.lawsearch.known_laws import KnownLaw, law_text, plan_law, read_laws, validate_law, validate_laws
 from tribo.lawsearch.model_choice import without_refuted_causes
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law

@@ -17,8 +17,8 @@ from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.cli import main
 from tribo.diagnostics.column_search import load_levels, regime_tests
+from tribo.diagnostics.direct_evidence import running_in, stroke_offset
 from tribo.diagnostics.verdict import Cause, Verdict
-from tribo.diagnostics.within_records import running_in, stroke_offset
 from tribo.fitting.alternatives import compared_laws
 from tribo.fitting.dependence import dependence
 from tribo.plausibility import doubts_of

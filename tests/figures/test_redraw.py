@@ -14,7 +14,7 @@ from tribo.errors import CampaignError
 from tribo.figures import FIGURES, style
 from tribo.outputs import csv_text
 from tribo.records import Study
-from tribo.report.redraw import _numbers, redrawn
+from tribo.report.drawings import _numbers, redrawn
 
 
 @pytest.mark.parametrize("width_mm", [90.0, 190.0])

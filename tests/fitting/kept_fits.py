@@ -17,8 +17,14 @@ from kept_numbers import scatter, write
 from other_fits import fit_errors_in_both, fit_power_law, pool_specimen_scatter
 
 from tribo.fitting import fit_samples, fit_three_term, power_of_campaign, uncertainty_budget
-from tribo.fitting.assessment import outlying_pulls, outlying_sentences, outlying_specimens, power_sentences
-from tribo.fitting.differences import paired_differences, smallest_difference
+from tribo.fitting.assessment import (
+    outlying_pulls,
+    outlying_sentences,
+    outlying_specimens,
+    paired_differences,
+    power_sentences,
+    smallest_difference,
+)
 from tribo.fitting.linear import WEIGHTS, repeat_scatter, sample_rows
 from tribo.records import REGIMES, LawFit, Regime
 

@@ -9,8 +9,7 @@ from scipy.stats import ttest_ind
 
 from tribo.errors import FitError
 from tribo.fitting import power_of_campaign
-from tribo.fitting.assessment import power_sentences
-from tribo.fitting.differences import smallest_difference
+from tribo.fitting.assessment import power_sentences, smallest_difference
 
 AREA = 55e-6
 LOADS = np.array([0.06, 0.26, 0.5, 1.4])

@@ -205,7 +205,7 @@ def test_a_tilted_sample_has_its_load_off_the_middle_by_what_was_asked() -> None
 
     from tribo.mechanisms.tilt import uneven
     from tribo.mechanisms_in_model.on_blocks import even, with_profile
-    from tribo.springblock.engines.start import lattice_of
+    from tribo.springblock.engines.state import lattice_of
 
     flat = SMALL.with_(sample="F", angle_deg=0.0, blocks=(60, 60))
     lattice = lattice_of(flat)

@@ -9,8 +9,8 @@ import pytest
 
 from tribo.cli.build_commands import build_progress, in_words, seconds_left
 from tribo.cli.console import Console
+from tribo.site.build import Progress, progress_of, run_workflow, typical_seconds
 from tribo.site.steps import JOURNAL, Step, note
-from tribo.site.workflow import Progress, progress_of, run_workflow, typical_seconds
 
 FIT_A, FIT_B, SIMULATE_B, INDEX = Step("fit", "a"), Step("fit", "b"), Step("simulate-Sx", "b"), Step("index")
 DUE = [FIT_A, FIT_B, SIMULATE_B, INDEX]

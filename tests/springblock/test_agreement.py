@@ -14,7 +14,7 @@ import pytest
 from tribo.springblock import SimConfig
 from tribo.springblock.engines.fast import integrate as run_fast
 from tribo.springblock.engines.reference import integrate as run_reference
-from tribo.springblock.engines.start import Trajectory, lattice_of, thresholds_of
+from tribo.springblock.engines.state import Trajectory, lattice_of, thresholds_of
 from tribo.springblock.run import run_of
 
 RECORD = Path(__file__).resolve().parents[2] / "docs" / "data"

@@ -17,8 +17,15 @@ from tribo.springblock.engines import ENGINES, state as k, strips
 from tribo.springblock.engines.active import advance
 from tribo.springblock.engines.fast import active_set, at_rest, integrate as run_fast, put_back, refuse_not_finite
 from tribo.springblock.engines.jit import VECTOR_OPTIONS
-from tribo.springblock.engines.start import SliderDrive, Thresholds, drive_of, lattice_of, thresholds_of
-from tribo.springblock.engines.state import sliding_threshold, static_threshold
+from tribo.springblock.engines.state import (
+    SliderDrive,
+    Thresholds,
+    drive_of,
+    lattice_of,
+    sliding_threshold,
+    static_threshold,
+    thresholds_of,
+)
 from tribo.springblock.lattice import Lattice
 
 STEPS = 14

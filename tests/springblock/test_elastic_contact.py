@@ -14,7 +14,7 @@ from tribo.records import Pattern
 from tribo.springblock import LocalFriction, SimConfig, simulate
 from tribo.springblock.engines.fast import integrate as run_fast
 from tribo.springblock.engines.reference import integrate as run_reference
-from tribo.springblock.engines.start import Thresholds, lattice_of, thresholds_of
+from tribo.springblock.engines.state import Thresholds, lattice_of, thresholds_of
 from tribo.springblock.lattice import make_lattice
 
 KAPPA = 1.2e11  # Pa/m, K_s / l2 at the defaults

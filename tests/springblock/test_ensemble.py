@@ -23,7 +23,7 @@ from tribo.springblock import (
     write_ensemble,
     write_run,
 )
-from tribo.springblock.ensemble_laws import simulated_law
+from tribo.springblock.calibration import simulated_law
 
 SMALL = SimConfig(blocks=(24, 24), dt_s=1e-7, rest_tolerance=1e-2)
 

@@ -10,7 +10,7 @@ from tribo.springblock import SimConfig, simulate
 from tribo.springblock.calibration import expected_minimum
 from tribo.springblock.config import PAPER, READINGS
 from tribo.springblock.engines.fast import integrate as run_fast
-from tribo.springblock.engines.start import Thresholds, drive_of, first_failure_s, lattice_of, thresholds_of
+from tribo.springblock.engines.state import Thresholds, drive_of, first_failure_s, lattice_of, thresholds_of
 
 SHORT = {"blocks": (31, 31), "duration_peaks": 1.3}
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tribo.berardo2019.table2 import table2_design
+from tribo.berardo2019.published_tables import table2_design
 from tribo.files import data_dir
 from tribo.springblock import simulate
 

@@ -12,7 +12,7 @@ from tribo.errors import SimulationError
 from tribo.springblock import SimConfig, simulate, stratified_design
 from tribo.springblock.config import ANGLES, OPEN_CHOICES, READINGS
 from tribo.springblock.design_file import runs_of_design
-from tribo.springblock.engines.start import lattice_of, thresholds_of
+from tribo.springblock.engines.state import lattice_of, thresholds_of
 
 RECORD = Path(__file__).resolve().parents[2] / "docs" / "data"
 DESIGN = {"samples": ["A", "Sy"], "pressures_kPa": [5.0], "repeats": 2}

@@ -11,7 +11,7 @@ from tribo.springblock import SimConfig, simulate
 from tribo.springblock.engines import ENGINES
 from tribo.springblock.engines.fast import integrate as run_fast
 from tribo.springblock.engines.reference import integrate as run_reference
-from tribo.springblock.engines.start import lattice_of, thresholds_of
+from tribo.springblock.engines.state import lattice_of, thresholds_of
 
 SMALL = SimConfig(blocks=(17, 17), dt_s=1e-8, duration_peaks=1.01)
 

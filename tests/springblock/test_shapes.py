@@ -15,8 +15,8 @@ from tribo.records import Pattern, picture_mask
 from tribo.springblock import SimConfig, simulate
 from tribo.springblock.config import mask_of
 from tribo.springblock.design_file import runs_of_design
-from tribo.springblock.engines.start import lattice_of, thresholds_of
-from tribo.springblock.shapes import touching_share
+from tribo.springblock.engines.state import lattice_of, thresholds_of
+from tribo.springblock.lattice import touching_share
 
 UM = 1e-6
 FAMILIES = {

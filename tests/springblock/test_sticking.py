@@ -11,7 +11,7 @@ from tribo.errors import SimulationError
 from tribo.springblock import SimConfig, simulate
 from tribo.springblock.engines.fast import integrate as run_fast
 from tribo.springblock.engines.reference import integrate as run_reference
-from tribo.springblock.engines.start import lattice_of, thresholds_of
+from tribo.springblock.engines.state import lattice_of, thresholds_of
 
 SMALL = SimConfig(blocks=(12, 12), pressure_Pa=3e3, angle_deg=10.0, seed=2, edges="periodic", duration_peaks=1.5)
 

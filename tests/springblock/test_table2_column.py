@@ -5,9 +5,9 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from tribo.berardo2019.table2 import beside, distance, table2, table2_design, table2_text
+from tribo.berardo2019.published_tables import beside, distance, table2, table2_design, table2_text
 from tribo.springblock import SimConfig
-from tribo.springblock.ensemble_laws import fitted
+from tribo.springblock.calibration import fitted
 
 
 def runs_of(law: dict[str, tuple[float, float]]) -> pd.DataFrame:

@@ -10,7 +10,7 @@ import pytest
 from tribo.springblock import SimConfig
 from tribo.springblock.engines import team
 from tribo.springblock.engines.fast import integrate as run_fast
-from tribo.springblock.engines.start import Trajectory, lattice_of, thresholds_of
+from tribo.springblock.engines.state import Trajectory, lattice_of, thresholds_of
 
 # Large enough for more than 64 strips to move at once, at the peak.
 CONFIG = SimConfig(sample="C", blocks=(64, 60), dt_s=1e-7, duration_peaks=1.1, window_start_peaks=1.05, seed=4)

@@ -24,7 +24,6 @@ from tribo.springblock.engine_speed import Timing, timed_run
 from tribo.springblock.engines import ENGINES, Engine, state as k
 from tribo.springblock.engines.fast import at_rest, in_chunks, refuse_thresholds, trajectory_of
 from tribo.springblock.engines.jit import compiled, copied_into_callers, inner, inner_vectorised, widest_vectors
-from tribo.springblock.engines.start import Thresholds, Trajectory, drive_of, first_failure_s
 from tribo.springblock.engines.state import (
     CODE,
     DENSE_STEPS,
@@ -33,6 +32,10 @@ from tribo.springblock.engines.state import (
     Numerics,
     Samples,
     State,
+    Thresholds,
+    Trajectory,
+    drive_of,
+    first_failure_s,
     observe,
     sliding_threshold,
     static_threshold,

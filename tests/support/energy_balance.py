@@ -8,7 +8,7 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
-from tribo.springblock.engines.start import Trajectory
+from tribo.springblock.engines.state import Trajectory
 from tribo.springblock.lattice import NEIGHBOURHOOD, Lattice
 
 

@@ -14,9 +14,8 @@ from tribo.errors import Problem, TraceError
 from tribo.records import PHASES, Pull, Test, Trace
 from tribo.traces.drive import drive_of, drive_stops
 from tribo.traces.evaluation import spring_of
-from tribo.traces.oscillation import oscillation_of
 from tribo.traces.phases import phases_of
-from tribo.traces.sliding import transient_end
+from tribo.traces.sliding import oscillation_of, transient_end
 from tribo.traces.zero import _level
 from tribo.zeroing import zero_choice
 

@@ -22,15 +22,15 @@ from tribo.cli.console import (
     findings_text,
 )
 from tribo.cli.study_options import FLAT, RULE, RUNS, SCHEDULER, WEIGHTS
-from tribo.site.workflow import Progress
 
 if TYPE_CHECKING:
-    from tribo.site.build import Built
+    from tribo.site.build import Built, Progress
+
+    Report = Callable[[Progress], None]
 
 
 EVERY_S = 30.0  # a line at least this often, also where nothing changes
 MOST_NAMED = 3
-Report = Callable[[Progress], None]
 
 
 @contextmanager

@@ -88,7 +88,7 @@ def figures(
     Draws every figure of OUT from the numbers beside it, as SVG and PDF whose text can be edited. Letters keep their
     size at any width.
     """
-    from tribo.report.redraw import write_redrawn
+    from tribo.report.drawings import write_redrawn
 
     pairs = [name.partition("=") for given in names for name in given.split(",")]
     if wrong := next((old for old, sign, new in pairs if not (old and sign and new)), None):
@@ -116,8 +116,7 @@ def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> N
 
     from tribo.campaign import open_campaign
     from tribo.diagnostics import plan_design
-    from tribo.lawsearch.known_laws import plan_law
-    from tribo.lawsearch.law_file import read_law
+    from tribo.lawsearch.known_laws import plan_law, read_law
     from tribo.wording.law_sentences import planned_law_sentence
     from tribo.wording.terminal import plan_text, why_not_found
 

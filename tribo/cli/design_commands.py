@@ -76,8 +76,7 @@ def map_family(
     """
     from tribo.design.family_map import map_csv, map_png, mapped
     from tribo.design.rounds import Rounds
-    from tribo.design.space import Space
-    from tribo.design.target import Family
+    from tribo.design.target import Family, Space
     from tribo.files import write_bytes, write_text
     from tribo.springblock.config import SimConfig
 

@@ -62,7 +62,7 @@ def init(console: Console, folder: Path, raw: Path | None, dry_run: bool, **opti
     """
     if raw is None:
         return _template(console, folder)
-    from tribo.drafting.draft_files import texts, write_draft
+    from tribo.drafting.draft import texts, write_draft
     from tribo.drafting.draft_table import draft_from_table
     from tribo.readers import columns_from_text
     from tribo.records import UNCORRECTED

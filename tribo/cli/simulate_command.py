@@ -97,8 +97,7 @@ def simulate(
     from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
     from tribo.springblock.design_file import asked_runs, described_by_options, read_design, together
     from tribo.springblock.ensemble import FRICTION, Work
-    from tribo.springblock.kept_runs import fault_of, run_stored
-    from tribo.springblock.results_file import ENSEMBLE, ONE_RUN, kind_of
+    from tribo.springblock.kept_runs import ENSEMBLE, ONE_RUN, fault_of, kind_of, run_stored
     from tribo.springblock.run import simulate as run_model
 
     if options["engine"] == "dense":
@@ -160,7 +159,7 @@ def pulled(
 
 def _laws_in(text: str) -> tuple[tuple[tuple[WrittenLaw, tuple[float, ...]], ...], str]:
     """The laws whose files a text names, with their amplitudes, and the rest of the text."""
-    from tribo.lawsearch.law_file import read_law
+    from tribo.lawsearch.known_laws import read_law
 
     items = text.split(",")
     files = [Path(item.strip()) for item in items if item.strip().endswith(".toml")]
@@ -192,9 +191,8 @@ def _one_run(console: Console, run: Run, out: Path) -> None:
 
 def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool) -> None:
     """The ensemble in words and as a record: beside the published column, or means and laws."""
-    from tribo.berardo2019.published_tables import load_table2
-    from tribo.berardo2019.table2 import beside, table2_text
-    from tribo.springblock.ensemble_laws import described, fitted
+    from tribo.berardo2019.published_tables import beside, load_table2, table2_text
+    from tribo.springblock.calibration import described, fitted
 
     record: dict[str, Any] = {"out": str(out), "runs": len(table)}
     if table2:

@@ -253,7 +253,7 @@ def demo(console: Console, out: Path, **options: Any) -> int:
     OUT/index.html leads to both.
     """
     from tribo.files import data_dir
-    from tribo.report.demo_page import SECOND, write_demo_page
+    from tribo.report.without_study import SECOND, write_demo_page
     from tribo.wording.terminal import card_text
 
     cards: list[Card] = []
@@ -409,7 +409,7 @@ def discover(
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.lawsearch.diagnosis_with_laws import discover_on_campaign, validate_on_campaign
-    from tribo.lawsearch.law_file import read_law
+    from tribo.lawsearch.known_laws import read_law
     from tribo.report.without_study import write_discovery, write_validation
 
     law = read_law(law_file) if law_file is not None else None

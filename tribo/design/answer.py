@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from tribo.berardo2019.published_tables import load_table2, load_table2_simulated_anew
-from tribo.design.rounds import Found, Lengths, Response, Say, Tried, misses, reached, responses, search
-from tribo.design.space import Space
-from tribo.design.surrogate import Surrogate
-from tribo.design.target import Target, Want, corrections_of_report, laws_of_report
+from tribo.design.rounds import Found, Lengths, Response, Say, Surrogate, Tried, misses, reached, responses, search
+from tribo.design.target import Space, Target, Want, corrections_of_report, laws_of_report
 from tribo.errors import Problem, SimulationError
 from tribo.springblock.calibration import CalibrationRuns, calibrate
 from tribo.springblock.config import LocalFriction, SimConfig

@@ -25,8 +25,7 @@ from tribo.diagnostics.inference import (
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.observations import observe, too_little
 from tribo.diagnostics.planning import more_tests, next_test_of
-from tribo.diagnostics.recorded_in_part import recorded_in_part
-from tribo.diagnostics.score_statistics import Absorption, StartEffects
+from tribo.diagnostics.score_statistics import Absorption, StartEffects, recorded_in_part
 from tribo.diagnostics.verdict import (
     CERTAIN_CAUSES,
     UNTESTED,

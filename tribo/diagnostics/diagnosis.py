@@ -14,12 +14,11 @@ import numpy as np
 from tribo.diagnostics.candidates import Named, best_beyond_chance, name_causes, weigh, weights_of
 from tribo.diagnostics.conclusion import conclude, exclusions
 from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
-from tribo.diagnostics.days_and_drift import session_of
 from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.fit import ModelFit, fit, residual_on_flat
 from tribo.diagnostics.model import PATTERN, Setup, effect_of, setup
-from tribo.diagnostics.observations import enough, observe
+from tribo.diagnostics.observations import enough, observe, session_of
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.scatter import held_still
 from tribo.diagnostics.score_statistics import StartEffects, start_effects

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import chi2, norm
 
-from tribo.diagnostics.days_and_drift import session_of
 from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
 from tribo.diagnostics.fit import ModelFit, fit, fit_without
 from tribo.diagnostics.model import (
@@ -31,7 +30,7 @@ from tribo.diagnostics.model import (
     Target,
 )
 from tribo.diagnostics.normal_equations import model_columns
-from tribo.diagnostics.observations import Observations
+from tribo.diagnostics.observations import Observations, session_of
 from tribo.diagnostics.replicates import drawn_residuals, refits
 from tribo.diagnostics.scatter import Noise, held_still, log_size_prior
 from tribo.diagnostics.verdict import Estimate, Gain, Layer, Nuisance

@@ -15,8 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.days_and_drift import along_specimens, sessions, walks
-from tribo.diagnostics.observations import Observations
+from tribo.diagnostics.observations import Observations, along_specimens, sessions, walks
 from tribo.diagnostics.predictor import Predictor
 from tribo.display import displayed
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism

@@ -20,9 +20,9 @@ from tribo.diagnostics.column_search import (
     regime_tests,
     search_columns,
 )
+from tribo.diagnostics.direct_evidence import RunningIn, running_in, stroke_offset
 from tribo.diagnostics.planning import more_tests
 from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, TooLittle, Verdict
-from tribo.diagnostics.within_records import RunningIn, running_in, stroke_offset
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, Ingested, Study

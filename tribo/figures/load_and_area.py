@@ -1,6 +1,6 @@
 """Friction against load, pressure and area fraction: Figs. 4, 6, 7 and 8 of Berardo et al. (2019), and agreement.
 
-The ratio of measured to simulated force at each load is that of :mod:`tribo.comparison.agreement`.
+The ratio of measured to simulated force at each load is that of :mod:`tribo.comparison.findings`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Transform
 
 from tribo.comparison import study_lookup
-from tribo.comparison.agreement import ratios
+from tribo.comparison.findings import ratios_of
 from tribo.errors import Problem, TriboError
 from tribo.figures import style
 from tribo.records import REGIMES, FloatArray, LawFit, Regime, Study
@@ -493,7 +493,7 @@ AGREEMENT = style.StudyFigure(
     "Ratio of the measured to the simulated friction force at each normal load, with its 95 % "
     "interval. At a ratio of 1 the model is exact; below 1 it predicts too much friction. The model "
     "was calibrated on the flat sample, so agreement there does not test the model.",
-    ratios,
+    ratios_of,
     draw_agreement,
 )
 RATIO = style.StudyFigure(

@@ -16,8 +16,7 @@ from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
 from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
-from tribo.lawsearch.known_laws import Validation, law_layer, validate_law, validate_laws
-from tribo.lawsearch.law_file import KnownLaw
+from tribo.lawsearch.known_laws import KnownLaw, Validation, law_layer, validate_law, validate_laws
 from tribo.lawsearch.model_choice import levels_of_cause, without_refuted_causes
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions

@@ -1,8 +1,7 @@
 """Putting a mechanism into the spring-block model itself: ``tribo simulate --with suction:dp=3000``.
 
-Every mechanism of the library can be simulated. Its placement says whether it acts on the blocks
-(:mod:`tribo.mechanisms_in_model.on_blocks`), in the measuring chain (:mod:`tribo.mechanisms_in_model.measuring_chain`)
-or replaces the sample by another one. At zero amplitude a run is that of the baseline to the bit.
+Every mechanism of the library can be simulated. Its placement says whether it acts on the blocks or in
+the measuring chain (:mod:`tribo.mechanisms_in_model.on_blocks`), or replaces the sample by another one. At zero amplitude a run is that of the baseline to the bit.
 """
 
 from __future__ import annotations
@@ -16,8 +15,7 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.mechanisms.record import Base, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
-from tribo.mechanisms_in_model.measuring_chain import measured
-from tribo.mechanisms_in_model.on_blocks import NOT_PULLED, RECORDED, Pulled, conditions_of_run, run_with
+from tribo.mechanisms_in_model.on_blocks import NOT_PULLED, RECORDED, Pulled, conditions_of_run, measured, run_with
 from tribo.records import Run
 from tribo.springblock.config import SimConfig
 from tribo.springblock.lattice import pattern_of

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from tribo import outputs
-from tribo.comparison.agreement import ratios
+from tribo.comparison.findings import ratios_of
 from tribo.comparison.study_lookup import all_set_aside
 from tribo.records import Pull, SetAside, Study, Test
 from tribo.vocabulary import label_with_unit
@@ -231,7 +231,7 @@ def comparison_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame |
         return None
     names = outputs.product("comparison.csv").column_names
     rows = pd.DataFrame([vars(row) for row in study.comparison.rows], columns=names[:7])
-    beside = ratios(study).drop(columns="sample_number")
+    beside = ratios_of(study).drop(columns="sample_number")
     return rows.merge(beside, on=["sample", "regime", "normal_load_N"], how="left", validate="1:1")
 
 

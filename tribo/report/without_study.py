@@ -1,20 +1,26 @@
-"""What is written where there is no study: laws found by tribo discover, and the diagnosis of a published table."""
+"""What is written where there is no study: laws found, the diagnosis of a published table, the page of tribo demo."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
+from tribo import __version__
 from tribo.diagnostics.verdict import plain
 from tribo.figures.catalogue import PUBLISHED_FIGURES
+from tribo.files import text_of, write_text
 from tribo.lawsearch.across_patterns import table_of
 from tribo.lawsearch.diagnosis_with_laws import law_layers
-from tribo.lawsearch.law_file import law_text
+from tribo.lawsearch.known_laws import law_text
 from tribo.outputs import csv_text, product
-from tribo.report.drawings import figure_files, svg_text
+from tribo.report.drawings import figure_files, inline_svg, svg_text
 from tribo.report.provenance import Provenance, write_results
+from tribo.report.shell import STYLE, WORKING, environment, style_and_script
 from tribo.wording.law_sentences import discovery_sentence, held_sentence, subject
 from tribo.wording.part_sentences import layer_sentence
 
@@ -23,6 +29,7 @@ if TYPE_CHECKING:
     from tribo.lawsearch.across_patterns import LawsAcross
     from tribo.lawsearch.known_laws import Validation
     from tribo.lawsearch.search import Discovery
+
 
 SCHEMA, RECORD = "tribo.discovery/1", "discovery.json"
 
@@ -80,3 +87,37 @@ def write_published(d: PublishedDiagnosis, across: Sequence[LawsAcross], out: Pa
         files = {"csv": csv_text(numbers), "svg": svg, **figure_files(svg, figure.title, origin)}
         contents |= {f"figures/{figure.name}.{ending}": files[ending] for ending in files}
     write_results(contents, out, provenance, "published")
+
+
+SECOND = "cause-found"
+
+
+def write_demo_page(out: Path) -> Path:
+    """Write OUT/index.html from the finished reports in OUT and OUT/cause-found; the same bytes for the same reports.
+
+    Parameters
+    ----------
+    out : Path
+        The folder of results of the first example; that of the second lies in it.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    campaigns = []
+    for name, folder in (("first", ""), ("second", f"{SECOND}/")):
+        figure = text_of(out / folder / "figures" / "finding.svg")
+        campaigns.append(
+            {
+                "folder": folder,
+                "card": json.loads(text_of(out / folder / "card.json")),
+                "verdict": json.loads(text_of(out / folder / "verdict.json")),
+                "figure": Markup(inline_svg(figure, name, "measured over modelled friction, less one, in percent")),
+            }
+        )
+    templates = environment()
+    text = templates.get_template("demo.html").render(
+        campaigns=campaigns, version=__version__, **style_and_script(templates, [STYLE], WORKING)
+    )
+    return write_text(out / "index.html", text)

@@ -10,7 +10,11 @@ from .ensemble import (
     run_ensemble as run_ensemble,
     stratified_design as stratified_design,
 )
-from .kept_runs import read_stored as read_stored, run_stored as run_stored
+from .kept_runs import (
+    read_stored as read_stored,
+    run_stored as run_stored,
+    write_ensemble as write_ensemble,
+    write_run as write_run,
+)
 from .lattice import PAPER_PATTERNS as PAPER_PATTERNS, contact_mask as contact_mask
-from .results_file import write_ensemble as write_ensemble, write_run as write_run
 from .run import simulate as simulate

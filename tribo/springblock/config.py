@@ -18,8 +18,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.input_files import LARGEST_NUMBER, MOST_BLOCKS, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import Pattern
 from tribo.springblock.engines import ENGINES, engines_with
-from tribo.springblock.lattice import STIFFEST, contact_mask, pattern_of
-from tribo.springblock.shapes import touching_share
+from tribo.springblock.lattice import STIFFEST, contact_mask, pattern_of, touching_share
 
 
 @displayed()

@@ -12,7 +12,7 @@ from tribo.springblock.config import SimConfig
 from tribo.springblock.engines import ENGINES
 from tribo.springblock.engines.fast import integrate as run_fast
 from tribo.springblock.engines.reference import integrate as run_reference
-from tribo.springblock.engines.start import Thresholds, Trajectory, lattice_of, thresholds_of
+from tribo.springblock.engines.state import Thresholds, Trajectory, lattice_of, thresholds_of
 from tribo.springblock.lattice import Lattice
 
 Progress = Callable[[int, int], None]

@@ -8,7 +8,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.springblock.config import SimConfig
 from tribo.springblock.engines import ENGINES
-from tribo.springblock.engines.start import Trajectory, lattice_of, thresholds_of
+from tribo.springblock.engines.state import Trajectory, lattice_of, thresholds_of
 
 
 def simulate(config: SimConfig, threads: int = 1) -> Run:

@@ -21,7 +21,6 @@ from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Te
 from tribo.traces.cuts import directions_of, piece_of, reversals, split_pulls
 from tribo.traces.drive import FEWEST_AT_REST, drive_of, speed_level_m_s
 from tribo.traces.loading import Zero, loading_of, starting_level
-from tribo.traces.oscillation import oscillation_of
 from tribo.traces.peak import (
     Apex,
     Motion,
@@ -35,7 +34,14 @@ from tribo.traces.peak import (
 from tribo.traces.phases import Course, as_stated, course_of, course_of_piece, phases_of
 from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
 from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
-from tribo.traces.sliding import Sliding, slides_on_closed_track, sliding_over, transient_end, window_between
+from tribo.traces.sliding import (
+    Sliding,
+    oscillation_of,
+    slides_on_closed_track,
+    sliding_over,
+    transient_end,
+    window_between,
+)
 from tribo.traces.zero import BEFORE_CONTACT, chosen_zero, disagreement_N, load_level, stated_zeros, zero_at_first
 from tribo.zeroing import ZeroChoice
 

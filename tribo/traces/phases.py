@@ -27,6 +27,7 @@ from tribo.traces.drive import (
     level_of,
     levels_of,
     quiet_end,
+    standstills,
 )
 from tribo.traces.loading import loading_of, starting_level
 from tribo.traces.signal import (
@@ -43,7 +44,6 @@ from tribo.traces.signal import (
     wander,
 )
 from tribo.traces.sliding import transient_end
-from tribo.traces.standstills import standstills
 
 _FLAT_START = 0.02  # share of a record that shows the load before contact, if there is such a part
 _LEVEL = 0.1  # share of the swing of a load within which it counts as level, and above which the bodies touch

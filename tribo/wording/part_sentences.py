@@ -8,13 +8,12 @@ from typing import Any
 
 from tribo.berardo2019.table_diagnosis import OverLoads
 from tribo.diagnostics.column_search import ColumnEffect
-from tribo.diagnostics.direct_evidence import Evidence
+from tribo.diagnostics.direct_evidence import OFFSET, Evidence, RunningIn
 from tribo.diagnostics.effect_sizes import Effect
 from tribo.diagnostics.verdict import UNTESTED, Cause, Estimate, Excluded, Layer, Misfit, NextTest
-from tribo.diagnostics.within_records import OFFSET, RunningIn
 from tribo.diagnostics.without_model import SERIES
 from tribo.lawsearch.grammar import WrittenLaw
-from tribo.lawsearch.law_file import KnownLaw
+from tribo.lawsearch.known_laws import KnownLaw
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS, mechanism

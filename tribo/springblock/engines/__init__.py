@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tribo.springblock.config import SimConfig
-    from tribo.springblock.engines.start import Thresholds, Trajectory
+    from tribo.springblock.engines.state import Thresholds, Trajectory
     from tribo.springblock.lattice import Lattice
 
     Integrate = Callable[[SimConfig, Lattice, Thresholds, int], Trajectory]

@@ -13,8 +13,7 @@ from tribo.springblock.engines import state as k
 from tribo.springblock.engines.active import Active, active_of, advance, assist
 from tribo.springblock.engines.bonds import energy_of_bonds
 from tribo.springblock.engines.jit import uncollected
-from tribo.springblock.engines.start import SliderDrive, Thresholds, Trajectory, drive_of, first_failure_s, once
-from tribo.springblock.engines.state import packed
+from tribo.springblock.engines.state import SliderDrive, Thresholds, Trajectory, drive_of, first_failure_s, once, packed
 from tribo.springblock.engines.strips import places_of, planes_of
 from tribo.springblock.engines.team import helped
 from tribo.springblock.lattice import Lattice

@@ -30,8 +30,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
 from tribo.springblock.engines.jit import compiled
-from tribo.springblock.engines.start import Thresholds, Trajectory, drive_of, first_failure_s, once
-from tribo.springblock.engines.state import Samples
+from tribo.springblock.engines.state import Samples, Thresholds, Trajectory, drive_of, first_failure_s, once
 from tribo.springblock.lattice import NEIGHBOURHOOD, NEIGHBOURS, Lattice
 
 START_SHARE = 0.98  # of the first failure
