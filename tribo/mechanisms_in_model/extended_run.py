@@ -1,7 +1,8 @@
 """Putting a mechanism into the spring-block model itself: ``tribo simulate --with suction:dp=3000``.
 
-Every mechanism of the library can be simulated. Its placement says whether it acts on the blocks or in
-the measuring chain (:mod:`tribo.mechanisms_in_model.on_blocks`), or replaces the sample by another one. At zero amplitude a run is that of the baseline to the bit.
+Every mechanism of the library can be simulated. Its placement says whether it acts on the blocks or in the measuring
+chain (:mod:`tribo.mechanisms_in_model.on_blocks`), or replaces the sample by another one. At zero amplitude a run is
+that of the baseline to the bit.
 """
 
 from __future__ import annotations
