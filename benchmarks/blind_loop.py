@@ -57,7 +57,7 @@ def undecided(v: Verdict) -> bool:
 
 def measurement(case: Case, design: Mapping[str, Any], number: int) -> tuple[float, float]:
     """The amplitude as a direct measurement gives it: the hidden one, or none, with the stated uncertainty."""
-    from tribo.mechanisms.table import MECHANISMS
+    from tribo.mechanisms import MECHANISMS
 
     name = design["measure"].partition(":")[0]
     size = dict(case.effects).get(name)

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base
-from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model.extended_run import SIMULATED, simulate_with
 from tribo.mechanisms_in_model.on_blocks import RECORDED, conditions_of_run
 from tribo.springblock import SimConfig, simulate

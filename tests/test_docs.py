@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import tribo
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.wording.numerals import sentence_case
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

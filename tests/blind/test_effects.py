@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tribo.campaign import load_campaign
-from tribo.mechanisms.table import NAMES
+from tribo.mechanisms import NAMES
 from tribo.stages import ingest
 
 from .bench import Noise

@@ -12,7 +12,7 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import Acting, Setup, predict, setup, start_changes
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.records import Ingested
 
 from .synthetic import SMALL, ingested

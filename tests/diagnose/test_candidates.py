@@ -27,7 +27,7 @@ from tribo.diagnostics.candidates import (
 from tribo.diagnostics.contrasts import FEWEST, Screen, _strongest as strongest, decided, deviate
 from tribo.diagnostics.model import Acting, Setup
 from tribo.diagnostics.score_statistics import start_effects
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.wording.verdict_sentences import worded
 
 from .known import acting, baseline, made

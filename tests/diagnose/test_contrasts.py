@@ -12,7 +12,7 @@ from tribo.diagnostics.contrasts import Contrast, all_contrasts, numeric_covaria
 from tribo.diagnostics.model import Acting, Setup, added, setup, start_changes
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 
 from .synthetic import Design, hidden
 

@@ -35,8 +35,8 @@ from tribo.lawsearch.known_laws import law_text, read_law, validate_law, why_not
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.lawsearch.search import RESCORED, Discovery, best_of, discover_laws
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions
-from tribo.mechanisms.table import MECHANISMS
 from tribo.wording.law_sentences import discovery_sentence, held_sentence, law_sentence, size_sentence
 from tribo.wording.part_sentences import layer_sentence, misfit_sentence, next_test_sentence
 from tribo.wording.verdict_sentences import verdict_in_words, worded

@@ -12,7 +12,7 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import GAIN, Acting, predict, setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 
 from .synthetic import PATTERNS, SMALL, hidden
 

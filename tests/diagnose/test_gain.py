@@ -13,7 +13,7 @@ from tribo.diagnostics.fit import fit
 from tribo.diagnostics.inference import _folds, gain, gain_of_zero
 from tribo.diagnostics.model import Acting, Setup
 from tribo.diagnostics.observations import observe
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 
 from .known import acting, baseline, made
 

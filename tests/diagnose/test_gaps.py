@@ -21,9 +21,9 @@ from tribo.figures.extended_model import law_numbers_of
 from tribo.lawsearch.grammar import Shape, WrittenLaw, shapes_of
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.search import Discovery
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.conditions import Conditions
 from tribo.mechanisms.covariate import score
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray, Ingested
 from tribo.wording.verdict_sentences import worded
 

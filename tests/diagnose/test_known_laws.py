@@ -19,7 +19,7 @@ from tribo.lawsearch.diagnosis_with_laws import with_laws, without_causes
 from tribo.lawsearch.grammar import Shape, WrittenLaw
 from tribo.lawsearch.known_laws import KnownLaw, law_text, plan_law, read_laws, validate_law, validate_laws
 from tribo.lawsearch.model_choice import without_refuted_causes
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law
 from tribo.springblock.config import SimConfig
 from tribo.wording.law_sentences import planned_law_sentence

@@ -31,7 +31,7 @@ from tribo.diagnostics.model import (
 )
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 
 from .synthetic import SMALL, hidden
 

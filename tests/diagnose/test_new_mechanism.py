@@ -11,6 +11,7 @@ from tribo.diagnostics import examine, plan_design
 from tribo.diagnostics.candidates import weigh
 from tribo.diagnostics.diagnosis import Diagnosis
 from tribo.diagnostics.score_statistics import start_effects
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import (
     Base,
     Conditions,
@@ -21,7 +22,6 @@ from tribo.mechanisms.record import (
     Values,
     amplitude,
 )
-from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import parse_with, simulate_with
 from tribo.records import Ingested
 from tribo.springblock import SimConfig, simulate

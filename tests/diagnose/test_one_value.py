@@ -15,7 +15,7 @@ from mechanisms.test_contract import base, conditions
 
 from tribo.diagnostics import examine
 from tribo.diagnostics.verdict import Verdict
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.wording.verdict_sentences import worded
 
 PATTERNS_OFF = Laboratory(samples=("F", "A", "B", "C"), days=6, pattern_rms=0.15)

@@ -24,7 +24,7 @@ from tribo.diagnostics.planning import Finding, Plan, first_test_of, next_test
 from tribo.diagnostics.scatter import first_noise
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.errors import FitError
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.records import Ingested
 from tribo.wording.part_sentences import next_test_sentence
 from tribo.wording.verdict_sentences import worded

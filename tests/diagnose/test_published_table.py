@@ -23,7 +23,7 @@ from tribo.berardo2019.table_model import (
     upper_limit,
 )
 from tribo.figures.catalogue import PUBLISHED_FIGURES
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.wording.verdict_sentences import worded
 
 

@@ -68,7 +68,7 @@ def test_the_named_cause_gains_on_samples_it_has_not_seen(tied: Diagnosis) -> No
 
 
 def test_every_mechanism_is_either_a_cause_or_excluded_with_a_reason(tied: Diagnosis) -> None:
-    from tribo.mechanisms.table import NAMES
+    from tribo.mechanisms import NAMES
 
     v = tied.verdict
     spoken_of = {c.mechanism for c in v.causes} | {e.mechanism.split(":")[0] for e in (*v.excluded, *v.not_testable)}
@@ -80,7 +80,7 @@ def test_every_mechanism_is_either_a_cause_or_excluded_with_a_reason(tied: Diagn
 
 
 def test_only_what_the_design_can_test_is_ruled_out(tied: Diagnosis) -> None:
-    from tribo.mechanisms.table import mechanism
+    from tribo.mechanisms import mechanism
 
     v, conditions = tied.verdict, tied.baseline.setup.observations.conditions
     assert all(mechanism(e.mechanism).applies(conditions) for e in v.excluded)

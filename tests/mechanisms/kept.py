@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from kept_numbers import scatter, write
 
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Conditions, Mechanism, Values
-from tribo.mechanisms.table import MECHANISMS
 
 from .test_contract import RECORDED, base, conditions, one_run
 

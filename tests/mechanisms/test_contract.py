@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tribo.mechanisms import MECHANISMS, NAMES, mechanism
 from tribo.mechanisms.record import Base, Conditions, Mechanism, Values
-from tribo.mechanisms.table import MECHANISMS, NAMES, mechanism
 
 LAWS = {"F": (4.8, 1.29, 2.9, 0.62), "B": (4.2, 0.59, 3.0, 0.38), "Sx": (3.7, 0.69, 2.95, 0.47)}
 ALL = pytest.mark.parametrize("m", MECHANISMS.values(), ids=list(MECHANISMS))

@@ -6,8 +6,8 @@ import json
 
 from kept_numbers import assert_as_kept
 
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Mechanism
-from tribo.mechanisms.table import MECHANISMS
 
 from .kept import KEPT, of
 from .test_contract import ALL

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.mislabelled_specimen import moves
 from tribo.mechanisms.record import Forces
-from tribo.mechanisms.table import MECHANISMS
 
 from .test_contract import LAWS, base, conditions
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tribo.mechanisms.table import NAMES
+from tribo.mechanisms import NAMES
 
 PACKAGE = Path(__file__).resolve().parents[2] / "tribo"
 OUTSIDE = [m for m in sorted(PACKAGE.rglob("*.py")) if m.relative_to(PACKAGE).parts[0] != "mechanisms"]
@@ -86,7 +86,7 @@ def test_a_module_outside_the_library_names_no_mechanism(module: Path) -> None:
         ('m = MECHANISMS["humidity"]', ["humidity"]),
         ("from tribo.mechanisms.covariate import score", ["covariate"]),
         ("from tribo.mechanisms import tilt", ["tilt"]),
-        ("from tribo.mechanisms.table import MECHANISMS", []),
+        ("from tribo.mechanisms import MECHANISMS", []),
         ('columns = ["sample", "covariate", "temperature"]\nrow["covariate"] = 1', []),
         ('"""suction: a word in the documentation"""', []),
     ],

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tribo.errors import SimulationError
+from tribo.mechanisms import MECHANISMS, NAMES
 from tribo.mechanisms.record import Base, Conditions
-from tribo.mechanisms.table import MECHANISMS, NAMES
 from tribo.mechanisms_in_model.extended_run import SIMULATED, choice_of, parse_given, parse_with, simulate_with
 from tribo.mechanisms_in_model.on_blocks import RECORDED, conditions_of_run
 from tribo.records import Run

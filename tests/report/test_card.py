@@ -15,7 +15,7 @@ from report.laid_out import html
 from report.synthetic import verdict_of
 from tribo.diagnostics.verdict import Cause, Estimate
 from tribo.errors import Problem
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.records import LawFit, SetAside, Study
 from tribo.wording.card import Card, card_law, card_of
 from tribo.wording.terminal import card_text, verdict_text

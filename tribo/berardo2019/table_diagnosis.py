@@ -30,7 +30,7 @@ from tribo.berardo2019.table_model import (
 )
 from tribo.diagnostics.verdict import Cause, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import Deviations, LawsAcross, across_patterns, geometry_of
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.records import REGIMES, FloatArray
 
 if TYPE_CHECKING:

@@ -22,8 +22,8 @@ from tribo.diagnostics.contrasts import FORM
 from tribo.diagnostics.model import Acting
 from tribo.diagnostics.predictor import error_sizes
 from tribo.diagnostics.verdict import Estimate
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions, Mechanism
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray
 from tribo.springblock.lattice import PAPER_PATTERNS
 

@@ -39,8 +39,8 @@ from tribo.diagnostics.verdict import (
     Verdict,
     Why,
 )
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Conditions, Mechanism
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray, Ingested
 
 Weighed = tuple[CauseCandidate, float, Mapping[str, Estimate]]  # with its share and its parameters

@@ -16,8 +16,8 @@ from scipy.stats import t as t_distribution
 from tribo.diagnostics.observations import Observations
 from tribo.diagnostics.verdict import Estimate, Layer
 from tribo.display import displayed
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import STROKES_APART, Quantity, TraceEvidence
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import CLOSED_TRACK_M, FloatArray, Ingested, Pull, Test, Trace
 
 CERTAIN = 5.0  # standard errors

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from tribo.diagnostics.observations import Observations, along_specimens, sessions, walks
 from tribo.diagnostics.predictor import Predictor
 from tribo.display import displayed
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 OF_A_SPECIMEN = 6  # gain, slope with the load and drift along its pulls, alike in both regimes and apart

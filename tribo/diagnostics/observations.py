@@ -17,9 +17,9 @@ from tribo.diagnostics.gaps import enough_recorded, with_gaps_filled
 from tribo.diagnostics.verdict import TooLittle
 from tribo.display import displayed
 from tribo.errors import FitError, Problem
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.conditions import levels_of, names_in, numbers_in
 from tribo.mechanisms.record import Conditions, StringArray
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
 from tribo.user_text import is_recorded
 

@@ -22,8 +22,8 @@ from tribo.diagnostics.scatter import SIZE_PRIORS, Noise
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.diagnostics.verdict import Misfit, NextTest, Outcome, TooLittle
 from tribo.display import displayed
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Conditions, Mechanism
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, Campaign, FloatArray
 
 PAPER_LAW = np.array([4.78, 23.44, 2.879, 11.89])  # mu and tau0 in kPa of the flat sample, Berardo 2019, Table 2

@@ -23,8 +23,8 @@ from tribo.diagnostics.column_search import (
 from tribo.diagnostics.direct_evidence import RunningIn, running_in, stroke_offset
 from tribo.diagnostics.planning import more_tests
 from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, TooLittle, Verdict
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, Ingested, Study
 from tribo.vocabulary import label_with_unit
 

@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from tribo.errors import Problem, SimulationError
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Mechanism, Values
-from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model.on_blocks import NOT_PULLED, RECORDED, Pulled, conditions_of_run, measured, run_with
 from tribo.records import Run
 from tribo.springblock.config import SimConfig

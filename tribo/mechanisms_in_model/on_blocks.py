@@ -19,8 +19,8 @@ from functools import partial
 import numpy as np
 
 from tribo.errors import Problem, SimulationError
+from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Placement, Values
-from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray, Pattern, Run
 from tribo.springblock.config import LocalFriction, SimConfig
 from tribo.springblock.engines import ENGINES

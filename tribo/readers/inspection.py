@@ -17,7 +17,7 @@ from tribo.readers.columns import NEEDED, Column, Columns, Given, assign, match_
 from tribo.readers.layout import Layout, first_table
 from tribo.readers.reading import (
     FATAL,
-    Reading,
+    ReadTable,
     machine_of,
     one_of,
     open_sources,
@@ -207,7 +207,7 @@ def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given)
     )
 
 
-def _read(file: str, parts: list[Reading], others: list[str], footer: list[str]) -> Inspection:
+def _read(file: str, parts: list[ReadTable], others: list[str], footer: list[str]) -> Inspection:
     first, layout = parts[0], parts[0].layout
     findings = [problem for part in parts for problem in part.findings]
     doubts = [problem for problem in findings if problem.kind not in FATAL]
@@ -252,7 +252,7 @@ def _columns(
     return tuple(seen)
 
 
-def _table(reading: Reading) -> TableSeen:
+def _table(reading: ReadTable) -> TableSeen:
     time, force = reading.arrays["time"], reading.arrays["friction force"]
     step = np.diff(time) if time.size > 1 else np.zeros(1)
     normal = reading.arrays.get("normal force")
@@ -271,7 +271,7 @@ def _table(reading: Reading) -> TableSeen:
     )
 
 
-def _signs(parts: list[Reading]) -> tuple[str, ...]:
+def _signs(parts: list[ReadTable]) -> tuple[str, ...]:
     found = []
     normal = parts[0].arrays.get("normal force")
     if normal is not None and np.median(normal) < 0:
@@ -284,7 +284,7 @@ def _signs(parts: list[Reading]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _doubts(reading: Reading, file: str) -> list[Problem]:
+def _doubts(reading: ReadTable, file: str) -> list[Problem]:
     label = {c.quantity: c.label for c in reading.columns}
     time, force = reading.arrays["time"], reading.arrays["friction force"]
     doubts = _other_candidates(reading)
@@ -309,7 +309,7 @@ def _doubts(reading: Reading, file: str) -> list[Problem]:
     return doubts
 
 
-def _other_candidates(reading: Reading) -> list[Problem]:
+def _other_candidates(reading: ReadTable) -> list[Problem]:
     """Columns that could stand for a needed quantity as well as the one that was taken."""
     layout = reading.layout
     taken = {c.index for c in reading.columns}

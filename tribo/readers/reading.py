@@ -53,7 +53,7 @@ _CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadTable:
     """One table: its position, the meaning of its columns, the numbers by quantity in SI units, the doubts."""
 
     source: Source
@@ -132,7 +132,7 @@ def split_choice(path: Path) -> tuple[Path, int | None]:
     return (path, None) if chosen is None else (path.with_name(chosen[1]), int(chosen[2]))
 
 
-def one_of(readings: Sequence[Reading], chosen: int | None, file: str) -> Reading:
+def one_of(readings: Sequence[ReadTable], chosen: int | None, file: str) -> ReadTable:
     """The reading of a number, or the only one.
 
     Raises
@@ -167,7 +167,7 @@ def read_blocks(
     return _traces(readings, path.stem if name is None else name, file, split=True)
 
 
-def _traces(readings: Sequence[Reading], name: str, file: str, *, split: bool) -> tuple[Trace, ...]:
+def _traces(readings: Sequence[ReadTable], name: str, file: str, *, split: bool) -> tuple[Trace, ...]:
     """Each table as a trace, cut where its time starts again if that is wanted; ReadError where one is damaged."""
     if split:
         readings = [part for reading in readings for part in split_at_restarts(reading)]
@@ -210,7 +210,7 @@ def _traces(readings: Sequence[Reading], name: str, file: str, *, split: bool) -
 
 def read_tables(
     path: Path, given: Given, file: str, *, beginning_only: bool = False
-) -> tuple[list[Reading], list[str], list[str]]:
+) -> tuple[list[ReadTable], list[str], list[str]]:
     """All tables of an export that are traces, of all sheets; a sheet without any counts only if none has.
 
     Returns
@@ -224,7 +224,7 @@ def read_tables(
     ReadError
         No table can be read, or one of several cannot.
     """
-    readings: list[Reading] = []
+    readings: list[ReadTable] = []
     others: list[str] = []
     footer: list[str] = []
     problems: list[Problem] = []  # of tables beside others that can be read
@@ -259,15 +259,15 @@ def read_tables(
 
 
 def _sorted_out(
-    outcomes: Sequence[Reading | ReadError], labels: Sequence[str]
-) -> tuple[list[Reading], list[str], list[Problem], list[Problem]]:
+    outcomes: Sequence[ReadTable | ReadError], labels: Sequence[str]
+) -> tuple[list[ReadTable], list[str], list[Problem], list[Problem]]:
     """The tables that are traces, labels of those that are none, problems, and columns that the latter lack."""
-    read: list[Reading] = []
+    read: list[ReadTable] = []
     others: list[str] = []
     problems: list[Problem] = []
     misfits: list[Problem] = []
     for outcome, label in zip(outcomes, labels, strict=True):
-        if isinstance(outcome, Reading):
+        if isinstance(outcome, ReadTable):
             read.append(outcome)
         elif all(p.kind in ("missing_column", "header_only") for p in outcome.problems):
             others.append(label)
@@ -313,7 +313,7 @@ def machine_of(source: Source) -> Machine:
     return READERS[source.machine] if source.machine else next(m for m in TEXT_MACHINES if m.recognises(source))
 
 
-def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -> Reading | ReadError:
+def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -> ReadTable | ReadError:
     """A table as a trace would hold it, or what keeps it from being one.
 
     A column that was not asked for is passed over where it cannot be what its name says: one without a number, one of
@@ -373,7 +373,7 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
     row = layout.units_row or layout.names_row
     findings += [replace(doubt, file=source.file, row=row) for doubt in doubts]
     findings += [*completed, *empty_start, *left_out]
-    return Reading(source, machine, layout, columns, arrays, tuple(findings), passed_over=passed_over)
+    return ReadTable(source, machine, layout, columns, arrays, tuple(findings), passed_over=passed_over)
 
 
 Written = tuple[tuple[Column, ...], FloatArray, tuple[Problem, ...], list[Problem]]
@@ -486,7 +486,7 @@ def _row_of(source: Source, layout: Layout, sample: int) -> int:
     return row
 
 
-def split_at_restarts(reading: Reading) -> Iterator[Reading]:
+def split_at_restarts(reading: ReadTable) -> Iterator[ReadTable]:
     """The reading cut where its time starts again from the beginning; itself where time runs back otherwise."""
     time = reading.arrays["time"]
     step = np.diff(time)

@@ -15,8 +15,8 @@ from tribo.diagnostics.without_model import SERIES
 from tribo.lawsearch.grammar import WrittenLaw
 from tribo.lawsearch.known_laws import KnownLaw
 from tribo.lawsearch.model_choice import FoundLaw
+from tribo.mechanisms import MECHANISMS, mechanism
 from tribo.mechanisms.record import Mechanism, TraceEvidence
-from tribo.mechanisms.table import MECHANISMS, mechanism
 from tribo.vocabulary import COLUMNS, OBSERVABLES, ColumnWords, in_words
 from tribo.wording.law_sentences import each_value, law_sentence, law_test, size_sentence, tied_laws
 from tribo.wording.numerals import counted, joined, p_text, sentence_case

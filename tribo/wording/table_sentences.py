@@ -10,7 +10,7 @@ import numpy as np
 from tribo.berardo2019.table_diagnosis import LEVEL, TableContrast, TableReading
 from tribo.berardo2019.table_model import TableFit, estimate_of, upper_limit
 from tribo.diagnostics.verdict import Gain, Verdict
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms import MECHANISMS
 from tribo.vocabulary import OBSERVABLES
 from tribo.wording.numerals import p_text
 

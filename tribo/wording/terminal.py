@@ -5,7 +5,7 @@ from __future__ import annotations
 from tribo.comparison import findings, study_lookup
 from tribo.diagnostics.planning import Finding, Plan
 from tribo.diagnostics.verdict import Verdict
-from tribo.mechanisms.table import mechanism
+from tribo.mechanisms import mechanism
 from tribo.records import PA_PER_KPA, REGIMES, LawFit, Regime, Study
 from tribo.wording import study_sentences as study_words
 from tribo.wording.card import Card
