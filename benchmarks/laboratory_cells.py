@@ -44,7 +44,7 @@ TIMES_HALF = (1.5, 3.0)  # sizes of effects under nuisance, of the half-found on
 LAW_STRENGTHS = (6.0, 14.0)  # of laws under nuisance, to an observer without it
 MISSING = (0.0, 0.1, 0.3, 0.5)
 GAP_EFFECTS = tuple(name for name in EFFECTS if name not in (*UNSEEN, *ALL_OR_NOTHING, "load_cell_drift",
-                                                             "bulk_viscoelasticity"))  # fmt: skip
+                                                             "wrong_weight", "bulk_viscoelasticity"))  # fmt: skip
 SEARCHED = 2  # repeats of three
 OFF_FORM = (0.0, 0.12)
 SIZED = tuple(name for name in GAP_EFFECTS if true_parameter(name, 1.0) and name != "load_cell_offset")

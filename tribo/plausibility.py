@@ -12,6 +12,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import pairwise
 
 import numpy as np
@@ -62,6 +63,7 @@ _SLED = "sleds of ASTM D1894 and ISO 8295 (200 g, 40 cm2, 1.7 to 2.5 mm/s) and t
 _RIGS = "force microscopes to brake rigs"
 SPEED_MM_S: Mapping[str, Bound] = {"": Bound(1e-9, 1e5, _RIGS), "sled": Bound(1e-5, 1e4, _SLED)}
 AREA_MM2: Mapping[str, Bound] = {"": Bound(1e-9, 1e7, _RIGS), "sled": Bound(1.0, 1e6, _SLED)}
+LIGHTEST_SLIDER_G = 0.05  # a tenth of the lightest sled below
 MASS_G: Mapping[str, Bound] = {"": Bound(1e-3, 1e6, _RIGS), "sled": Bound(0.5, 5e4, _SLED)}
 TEMPERATURE_C: Mapping[str, Bound] = {
     "": Bound(-100.0, 250.0, "glass transition to decomposition of common polymers"),
@@ -262,7 +264,8 @@ def doubts_of(campaign: Campaign, ingested: Ingested | None = None, fits: Sequen
     found = [doubt for q, by in numbers.items() if (doubt := _outside(campaign, q, by, _PLACES[q], slip)) is not None]
     if not slip:  # one that explains the loads or the area explains these as well
         found += [*_wide_pitches(campaign), *_load_span(campaign)]
-    return (*found, *_stated(campaign), *_geometry(campaign), *_names(campaign), *_sled(campaign), *_order(campaign))
+    found += [*_stated(campaign), *_geometry(campaign), *_names(campaign), *_sled(campaign), *_order(campaign)]
+    return (*found, *_rests(campaign), *(_exports(ingested) if ingested is not None else ()))
 
 
 def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawFit]) -> Numbers:
@@ -380,11 +383,55 @@ def _sled(campaign: Campaign) -> Iterator[Doubt]:
         slip = "weigh sled and sample without the added mass; if mass_g holds them, state slider_mass_g = 0"
         found, place = "not stated, and taken as 0 g", f"{_TOML}, slider_mass_g"
         yield Doubt("slider_mass_g", "the mass of the slider", found, "a mass in g, or 0", place, slip)
+    slider_g = campaign.slider_mass_kg * 1e3
+    if 0.0 < slider_g < LIGHTEST_SLIDER_G:
+        slip, place = "it looks like kilograms: multiply by 1000?", f"{_TOML}, slider_mass_g"
+        allowed = f"{LIGHTEST_SLIDER_G:g} g or more"
+        yield Doubt("slider_mass_g", "the mass of the slider", f"{slider_g:.3g} g", allowed, place, slip)
     cells = [(t.sample, round(t.normal_load_N, 9)) for t in campaign.tests]
-    if cells and len(cells) > len(set(cells)) and not any(t.specimen for t in campaign.tests):
-        slip = "without it, pulls of one specimen count as of one body, and uncertainties may be too small"
+    is_sled = any(t.load_from == "mass_g" for t in campaign.tests)
+    if is_sled and len(cells) > len(set(cells)) and all(t.specimen in ("", t.sample) for t in campaign.tests):
+        slip = "without it, all pulls of a sample count as of one body, and uncertainties may be too small"
         place = f"{_TABLE}, column specimen"
         yield Doubt("specimen", "the specimen of each test", "not stated", "a name for each", place, slip)
+
+
+def _rests(campaign: Campaign) -> Iterator[Doubt]:
+    """Hold times for which there was no time: longer than from one test to the next."""
+    timed = sorted((t.started_at, t.hold_s, t.test_id) for t in campaign.tests if len(t.started_at) > 10)
+    pairs = [
+        (hold, (datetime.fromisoformat(at) - datetime.fromisoformat(before)).total_seconds(), name)
+        for (before, _, _), (at, hold, name) in pairwise(timed)
+        if hold is not None
+    ]
+    pairs = [row for row in pairs if row[1] > 0]
+    late = [(hold, gap, name) for hold, gap, name in pairs if hold > gap]
+    if len(late) > len(pairs) / 2:
+        hold, gap, name = late[0]
+        found, allowed = f"{hold:g} s ({name}), {gap:g} s after the test before", "less than between two tests"
+        fits = all(hold / 1000 < gap for hold, gap, _ in late)
+        slip = "hold_s looks like milliseconds: divide by 1000?" if fits else ""
+        yield Doubt("hold_s", "hold time", found, allowed, f"{_TABLE}, column hold_s and started_at", slip)
+
+
+def _exports(ingested: Ingested) -> Iterator[Doubt]:
+    """Exports that bear the name of another test, and a lever arm where no torque was recorded."""
+    ids = {t.test_id for t in ingested.campaign.tests if len(t.test_id) > 1 and not t.test_id.isdigit()}
+    other = {}
+    for name, trace in ingested.traces.items():
+        said = {str(text).strip() for text in trace.metadata.values()} & ids
+        if said and name not in said:
+            other[name] = f"{name} ({', '.join(sorted(said))})"
+    if other:
+        place, slip = f"{_TABLE}, column file", "exports or rows may be exchanged"
+        yield Doubt("file", "the test named in the export", _listed([*other.values()]), "that of its row", place, slip)
+    arms = [t.test_id for t in ingested.campaign.tests if t.correction.lever_arm_m is not None]
+    sources = [trace.source for name in arms if (trace := ingested.traces.get(name)) is not None]
+    reasons = [why for source in sources if source is not None for why in source.reasons.values()]
+    if reasons and not any("lever arm" in why for why in reasons):
+        place, slip = f"{_TOML}, lever_arm_mm", "the exports record a force: leave the lever arm out?"
+        allowed = "only where a torque is recorded"
+        yield Doubt("lever_arm_mm", "a lever arm", "stated and not used", allowed, place, slip)
 
 
 def _order(campaign: Campaign) -> Iterator[Doubt]:

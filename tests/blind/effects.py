@@ -112,6 +112,12 @@ def _drift(b: Bench, size: float, rng: np.random.Generator) -> None:
     b.zero = b.zero + 0.163 * size * b.column("run_order") / len(b.tests)
 
 
+def _false_weight(b: Bench, size: float, rng: np.random.Generator) -> None:
+    """The 50 g weight is 15.7 % heavier than it says."""
+    extra_g = np.where(b.column("mass_g") == 50.0, 50.0 * 0.157 * size, 0.0)
+    b.remake(b.column("N") + extra_g * 1e-3 * GRAVITY, list(b.tests["true_sample"]))
+
+
 def _tilt(b: Bench, size: float, rng: np.random.Generator) -> None:
     """The resultant moves forward with T/N; where the pressure would be negative, the sled is lifted.
 
@@ -216,18 +222,18 @@ EFFECTS: dict[str, Effect] = {
     "contact_area_loss": _area_loss, "velocity_dependence": _velocity, "contact_ageing": _ageing,
     "run_in": _run_in, "edge_adhesion": _edges, "temperature": _temperature, "humidity": _humidity,
     "mislabelled_specimen": _mislabelled, "covariate:operator": _operator, "load_cell_offset": _offset,
-    "load_cell_drift": _drift, "tilt": _tilt, "cavity_collapse": _collapse,
+    "load_cell_drift": _drift, "wrong_weight": _false_weight, "tilt": _tilt, "cavity_collapse": _collapse,
     "cavity_shear_deformation": _shear, "pattern_geometry": _moulding, "bulk_viscoelasticity": _prony,
     "sampling_clip": _slow_recorder, "pull_angle": _wire_up, "pulley_friction": _roller,
     "machine_compliance": _soft_machine, "outside:day": _day_wave, "outside:temperature": _cold_and_hot,
     "outside:humidity": _dry_and_damp, "outside:counterface": _other_counterface,
 }  # fmt: skip
 # These change what the law is given, so they come before those that change what it gives.
-FIRST = ("mislabelled_specimen", "suction", "normal_load_error", "pressure_dependent_friction")
+FIRST = ("mislabelled_specimen", "suction", "wrong_weight", "normal_load_error", "pressure_dependent_friction")
 LARGEST = {
     "suction": 18.3, "normal_load_error": 11.7, "pressure_dependent_friction": 4.57, "contact_area_loss": 1.0,
     "velocity_dependence": 6.87, "contact_ageing": 9.0, "run_in": 11.7, "edge_adhesion": 11.3, "temperature": 6.0,
-    "humidity": 2.0, "mislabelled_specimen": 1.0, "tilt": 3.0, "cavity_collapse": 1.283,
+    "humidity": 2.0, "mislabelled_specimen": 1.0, "tilt": 3.0, "wrong_weight": 4.0, "cavity_collapse": 1.283,
     "cavity_shear_deformation": 4.0, "pattern_geometry": 1.97, "bulk_viscoelasticity": 4.83, "sampling_clip": 4.0,
     "pull_angle": 3.0, "pulley_friction": 10.0, "machine_compliance": 10.0, "outside:day": 8.0,
     "outside:temperature": 4.0, "outside:humidity": 3.0, "outside:counterface": 8.0,

@@ -15,12 +15,13 @@ def specimen_gains(
 ) -> np.ndarray:
     """Factor of every force, shape (n, 2): each specimen has a gain and a slope in the logarithm of the load.
 
-    For further pulls with the specimens of a ``first`` bench, the same draws as there.
+    For further pulls with the specimens of a ``first`` bench, the same draws as there; fresh ones are drawn after them.
     """
     first = first or bench
     x = np.log(bench.column("N")) - np.log(first.column("N")).mean()
     names = sorted(set(first.tests["specimen"]))
-    drawn = {name: _pair(rng, 2) * [[design.specimen_sd], [design.specimen_slope]] for name in names}
+    fresh = sorted(set(bench.tests["specimen"]) - set(names))
+    drawn = {name: _pair(rng, 2) * [[design.specimen_sd], [design.specimen_slope]] for name in [*names, *fresh]}
     rows = np.array([drawn[name] for name in bench.tests["specimen"]])
     return np.exp(rows[:, 0] + x[:, None] * rows[:, 1])
 

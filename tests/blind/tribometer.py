@@ -47,8 +47,10 @@ def with_further(
 ) -> Bench:
     """A bench with further pulls on the same specimens, made after all others.
 
-    ``rows`` are tests of the bench to be made again, as they are or at another load ``N``; where they have a column
-    ``without``, the effect that it names does not act. Effects that draw something at random are not allowed.
+    ``rows`` are tests of the bench to be made again, as they are or at another load ``N``, speed or hold; where they
+    have a column ``without``, the effect that it names does not act. Temperature, humidity and operator are those of
+    the later day, or those of the columns ``set_temperature_C`` and so on where there are any. A specimen that the
+    bench does not have is a fresh one. Effects that draw something at random are not allowed.
     """
     made = len(bench.tests)
     rng = np.random.default_rng([seed, made])
@@ -57,11 +59,13 @@ def with_further(
     rows["mass_g"] = rows["N"] / GRAVITY * 1e3 - 1.5
     rows["run_order"] = made + 1 + np.arange(len(rows))
     last = bench.tests.groupby("specimen")["specimen_run"].max()
-    rows["specimen_run"] = rows["specimen"].map(last) + rows.groupby("specimen").cumcount() + 1
+    rows["specimen_run"] = rows["specimen"].map(last).fillna(0).astype(int) + rows.groupby("specimen").cumcount() + 1
     rows["started_at"] = _stamps(made + len(rows))[made:]
     rows["temperature_C"] = (23 + rng.normal(0, 1.1, len(rows))).round(1)
     rows["humidity_pct"] = (48 + rng.normal(0, 3, len(rows))).round(1)
     rows["operator"] = rng.choice(["op1", "op2"], len(rows))
+    for name in ("temperature_C", "humidity_pct", "operator"):
+        rows[name] = rows.get(f"set_{name}", rows[name])
     removed = set(rows.get("without", pd.Series([""])))
     more = Bench(rows, bench.law, bench.errors, bench.measured_shares)
     _apply([(name, size) for name, size in effects if name not in removed], more, rng)

@@ -1,4 +1,4 @@
-"""The forty mistakes: each with the place and the remedy that its message must name."""
+"""More than sixty mistakes: each with the place and the remedy that its message must name."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from pathlib import Path
 from mistakes.slips import (
     Mistake,
     each_row,
+    exchanged,
     export,
     header,
     option,
+    recorded,
     renamed,
     rows,
+    text_of,
     toml,
+    without,
     write_rows,
 )  # fmt: skip
 
@@ -73,6 +77,34 @@ def _inside_the_campaign(folder: Path) -> tuple[object, ...]:
 def _columns_of_another_machine(folder: Path) -> None:
     with (folder / "campaign.toml").open("a", encoding="utf-8") as stream:
         stream.write('[columns]\nforce = "Laod [N]"\n')
+
+
+def _a_table_of_other_columns(folder: Path) -> None:
+    with (folder / "campaign.toml").open("a", encoding="utf-8") as stream:
+        stream.write('[columns]\nforce = "Extension [mm]"\n')
+
+
+def _exports_of_the_next_row(folder: Path) -> None:
+    table = rows(folder)
+    files = [row["file"] for row in table]
+    write_rows(folder, [row | {"file": file} for row, file in zip(table, files[1:] + files[:1], strict=True)])
+
+
+def _no_export(folder: Path) -> None:
+    (folder / "raw" / "T001.csv").unlink()
+
+
+def _no_table(folder: Path) -> None:
+    (folder / "tests.csv").unlink()
+
+
+def _lever_arm(folder: Path) -> tuple[object, ...]:
+    return folder, "--set", "lever_arm_mm=10"
+
+
+def _results_into_a_file(folder: Path) -> tuple[object, ...]:
+    (folder.parent / "results").write_text("x", encoding="utf-8")
+    return folder, "-o", folder.parent / "results"
 
 
 def _unknown_decision(folder: Path) -> tuple[object, ...]:
@@ -180,4 +212,93 @@ MISTAKES = (
     Mistake("an export without units", export('"(s)","(mm)","(N)"\n', ""), "raw/T001.csv", "columns", REFUSED),
     Mistake("a column of another machine",
             _columns_of_another_machine, "raw/T001.csv", r"did you mean Load\?|did you mean Load \[N\]", REFUSED),
+    Mistake("results written into a file", _results_into_a_file, "--out", "is a file", (2,)),
+    Mistake("a lever arm for a recorded force", _lever_arm, "lever_arm_mm", "leave the lever arm out", DOUBTED),
+    Mistake("campaign.toml saved as UTF-16",
+            text_of("campaign.toml", lambda b: b.decode().encode("utf-16")), "campaign.toml", "UTF-8", REFUSED),
+    Mistake("a table of campaign.toml in capitals",
+            toml("[campaign]", "[Campaign]"), "Campaign", r"did you mean campaign\?", REFUSED),
+    Mistake("the slider mass in kilograms",
+            toml("= 1.5", "= 0.0015"), "slider_mass_g", r"kilograms: multiply by 1000\?", DOUBTED),
+    Mistake("an area of zero", toml("= 55.0", "= 0"), "nominal_area_mm2", "greater than 0", REFUSED),
+    Mistake("a circle with two lengths",
+            toml("diameter_um = 10.0", "size_um = [10.0, 10.0]"), "patterns.B", "requires diameter_um", REFUSED),
+    Mistake("a rectangle with a diameter",
+            toml("size_um = [200.0, 40.0]", "diameter_um = 40.0"), "patterns.S", "requires size_um", REFUSED),
+    Mistake("the gap between cavities given as the pitch",
+            toml("[15.0, 15.0]", "[5.0, 5.0]"), "patterns.B", "pitch must be larger", REFUSED),
+    Mistake("the extension stated as the force",
+            _a_table_of_other_columns, "column Extension", "not a unit of friction force", REFUSED),
+    # tests.csv again
+    Mistake("no table of tests", _no_table, "tests.csv", "tests.csv, tests.xlsx or tests.ods", REFUSED),
+    Mistake("the table of tests with a double ending",
+            renamed("tests.csv", "tests.csv.csv"), "tests.csv", r"rename tests.csv.csv\?", REFUSED),
+    Mistake("the columns of hold and speed exchanged", exchanged("hold_s", "speed_mm_s"), "T001.csv",
+            "does not match the speed of the test", DOUBTED),
+    Mistake("no column of samples", without("sample"), "column sample", "required column is missing", REFUSED),
+    Mistake("no column of loads", without("mass_g"), "mass_g or normal_load_N", "required column is missing", REFUSED),
+    Mistake("no column of specimens", without("specimen"), "column specimen", "a name for each", DOUBTED),
+    Mistake("decimal commas that split the cells",
+            text_of("tests.csv", lambda b: b.replace(b"0.2,", b"0,2,")), "row 2", "14 cells under 13", REFUSED),
+    Mistake("a comma for thousands",
+            each_row(lambda row: {"mass_g": "1,385"}, 0, 1), "row 2, column mass_g", "a decimal point", LEFT_OUT),
+    Mistake("a row of units below the names",
+            text_of("tests.csv", lambda b: b.replace(b"\n", b"\n,,,,,g,mm/s,s,,,,C,%\n", 1)),
+            "row 2, column mass_g", "found 'g'", LEFT_OUT),
+    Mistake("a row of means at the end",
+            text_of("tests.csv", lambda b: b + b"Mean,,,,,80,,,,,,,\n"), "Mean", "no file is given", LEFT_OUT),
+    Mistake("a path of another computer",
+            each_row(lambda row: {"file": "C:\\data\\" + Path(row["file"]).name}), "row 2, column file",
+            r"did you mean raw/T001.csv\?", REFUSED),
+    Mistake("the folder of exports in capitals", renamed("raw", "Raw"), "row 2, column file",
+            r"did you mean Raw/T001.csv\?", REFUSED),
+    Mistake("a sample by its description",
+            each_row(lambda row: {"sample": "flat"} if row["sample"] == "F" else None), "column sample",
+            r"a table \[patterns.flat\]", LEFT_OUT),
+    Mistake("a mass and another load",
+            each_row(lambda row: {"normal_load_N": "1.0"}), "normal_load_N", "differs from the weight", REFUSED),
+    Mistake("the mass in milligrams", _times("mass_g", 1e3), "mass_g", r"milligrams: divide by 1000\?", DOUBTED),
+    Mistake("millinewtons for newtons", _as_load(1e3), "loads", r"millinewtons: divide by 1000\?", DOUBTED),
+    Mistake("a negative mass",
+            each_row(lambda row: {"mass_g": "-25"}, 0, 1), "row 2, column mass_g", "0 g or more", LEFT_OUT),
+    Mistake("a mass in words",
+            each_row(lambda row: {"mass_g": "heavy"}, 0, 1), "row 2, column mass_g", "allowed: a number", LEFT_OUT),
+    Mistake("an empty mass", each_row(lambda row: {"mass_g": ""}, 0, 1), "T001", "normal load", LEFT_OUT),
+    Mistake("the speed in m/s", _times("speed_mm_s", 1e-3), "displacement", r"m/s: multiply by 1000\?", DOUBTED),
+    Mistake("another speed than was set", _times("speed_mm_s", 2.0), "displacement", "allowed: 0.4 mm/s", DOUBTED),
+    Mistake("the hold in milliseconds", _times("hold_s", 1e3), "hold_s", r"milliseconds: divide by 1000\?", DOUBTED),
+    Mistake("dates whose day and month cannot be told",
+            each_row(lambda row: {"started_at": "03/04/2026 10:15 AM"}), "column started_at", "YYYY-MM-DD", REFUSED),
+    Mistake("another year in one row",
+            each_row(lambda row: {"started_at": row["started_at"].replace("2026", "2062")}, 0, 1),
+            "run_order and started_at", "the order of started_at", DOUBTED),
+    Mistake("a humidity beyond 100 %",
+            each_row(lambda row: {"humidity_pct": "480"}), "humidity_pct", "0 to 100", DOUBTED),
+    Mistake("one mass ten times too large",
+            each_row(lambda row: {"mass_g": f"{float(row['mass_g']) * 10:g}"}, 4, 5),
+            "T005", "another load", DOUBTED, True),
+    # raw/ again
+    Mistake("exports of the next row", _exports_of_the_next_row, "column file", "may be exchanged", DOUBTED),
+    Mistake("a force that acts backwards", recorded(2, lambda x: -x), "T001.csv, column force",
+            "sign may be reversed", REFUSED),
+    Mistake("gram-force called newtons", recorded(2, lambda x: x / 9.80665e-3), "T/N", "gram-force", DOUBTED),
+    Mistake("millinewtons called newtons", recorded(2, lambda x: x * 1e3), "T/N", "millinewtons", DOUBTED),
+    Mistake("newtons called kilonewtons", export('"(N)"', '"(kN)"'), "T/N", "state the unit in", DOUBTED),
+    Mistake("milliseconds called seconds", recorded(0, lambda x: x * 1e3), "displacement",
+            "does not match the speed", DOUBTED),
+    Mistake("metres called millimetres", recorded(1, lambda x: x / 1e3), "displacement",
+            "does not match the speed", DOUBTED),
+    Mistake("names of columns exchanged",
+            export('"Time","Extension","Load"', '"Load","Extension","Time"'), "column Time", "not a unit of time",
+            REFUSED),
+    Mistake("records that end before the sled slips",
+            text_of("raw/T001.csv", lambda b: b"\n".join(b.split(b"\n")[:40])), "T001",
+            "ends before the static peak", LEFT_OUT),
+    Mistake("an export that is not there", _no_export, "row 2, column file", "does not exist", LEFT_OUT),
+    Mistake("an empty export", text_of("raw/T001.csv", lambda b: b""), "raw/T001.csv", "is empty", LEFT_OUT),
+    Mistake("a page of the web for an export",
+            text_of("raw/T001.csv", lambda b: b"<html><body>404</body></html>"), "raw/T001.csv",
+            "no table of numbers", LEFT_OUT),
+    Mistake("a PDF for an export",
+            text_of("raw/T001.csv", lambda b: b"%PDF-1.4 \x00\x01"), "raw/T001.csv", "not a text file", LEFT_OUT),
 )  # fmt: skip

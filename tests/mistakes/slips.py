@@ -17,7 +17,8 @@ class Mistake:
     """``make`` spoils the campaign folder; the dry run must then name ``place`` and ``remedy`` (regular expressions).
 
     ``make`` may return other arguments for the command: the campaign to give, and options. ``status`` are the exit
-    statuses that are right: 1 and 2 refuse, 3 leaves tests out, 0 goes on with a doubt.
+    statuses that are right: 1 and 2 refuse, 3 leaves tests out, 0 goes on with a doubt. What shows in the siblings of a
+    test alone is made in a campaign of three specimens and five loads (``with_siblings``).
     """
 
     name: str
@@ -25,6 +26,7 @@ class Mistake:
     place: str
     remedy: str
     status: tuple[int, ...]
+    with_siblings: bool = False
 
 
 def rows(folder: Path) -> Rows:
@@ -93,6 +95,43 @@ def option(*words: str):
 def renamed(old: str, new: str):
     def make(folder: Path) -> None:
         (folder / old).rename(folder / new)
+
+    return make
+
+
+def exchanged(one: str, other: str):
+    """Two columns of tests.csv in each other's place."""
+    return each_row(lambda row: {one: row[other], other: row[one]})
+
+
+def without(column: str):
+    """A column of tests.csv left out."""
+
+    def make(folder: Path) -> None:
+        write_rows(folder, [{name: cell for name, cell in row.items() if name != column} for row in rows(folder)])
+
+    return make
+
+
+def text_of(name: str, change: Callable[[bytes], bytes]):
+    """Other bytes in a file."""
+
+    def make(folder: Path) -> None:
+        (folder / name).write_bytes(change((folder / name).read_bytes()))
+
+    return make
+
+
+def recorded(column: int, change: Callable[[float], float], only: str = "*.csv"):
+    """Other numbers in one column of the exports."""
+
+    def make(folder: Path) -> None:
+        for path in (folder / "raw").glob(only):
+            lines = [line.split(",") for line in path.read_text(encoding="utf-8").split("\n")]
+            for cells in lines:
+                if len(cells) == 3 and re.fullmatch(r'"-?[\d.]+"', cells[column]):
+                    cells[column] = f'"{change(float(cells[column][1:-1])):.6g}"'
+            path.write_text("\n".join(map(",".join, lines)), encoding="utf-8")
 
     return make
 

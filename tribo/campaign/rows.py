@@ -306,7 +306,9 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
     try:
         if path is None or leads_out(root, root / path):
             what = "the path leads outside the campaign"
-            return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
+            hint = _meant_file(root, PurePosixPath(name.replace("\\", "/").rpartition("/")[2]))
+            allowed = f"a path inside the campaign folder{f'; {hint}' if hint else ''}"
+            return [Problem("path_outside_campaign", what, *place, allowed)]
         in_a_zip = any(p.suffix.lower() == ".zip" and (root / p).is_file() for p in path.parents)
         if (root / path).is_file() or in_a_zip:  # its reader looks for the entry
             return []
@@ -325,7 +327,8 @@ def _meant_file(root: Path, path: PurePosixPath) -> str:
     """The file that a path may mean, as a question: in raw/, with an ending, or spelled otherwise."""
     if not path.name:
         return ""
-    for folder in dict.fromkeys(((root / path).parent, root / RAW)):
+    spelled = [p for p in root.iterdir() if p.is_dir() and p.name.lower() == str(path.parent).lower()]
+    for folder in dict.fromkeys(((root / path).parent, root / RAW, *spelled)):
         beside = [p.name for p in folder.iterdir() if p.is_file()] if folder.is_dir() else []
         stems = [name for name in beside if name.rpartition(".")[0].lower() == path.stem.lower()]
         same = [n for n in beside if n.lower() == path.name.lower()] or (stems if len(stems) == 1 else [])

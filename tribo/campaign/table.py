@@ -55,6 +55,7 @@ _CHOICE = re.compile(rf"#(\*|{WHOLE}|\d+(?:/(?:\d+|\*|{WHOLE}))?)$")
 ALLOWED_DATES = (
     "YYYY-MM-DD or YYYY-MM-DDTHH:MM:SS; DD/MM/YYYY or MM/DD/YYYY where a day after the 12th settles the order"
 )
+_SEP = re.compile(r"sep=([,;\t|])\r?\n", re.IGNORECASE)  # how a spreadsheet states the delimiter
 _DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
 _TIME = re.compile(r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?(?: ?([AaPp])\.?[Mm]\.?)?")
 _ISO = re.compile(r"\d{4}-?\d\d-?\d\d(?:[T ]\d\d.*)?|\d{4}-?W\d\d.*")
@@ -133,7 +134,8 @@ def read_table(path: Path, file: str) -> tuple[list[str], int, list[TestRow]]:
     is_workbook = raw[:4] in (ZIP, OLD_EXCEL)
     text = _sheet_of_tests(raw, file) if is_workbook else _decoded(raw)
     first = next((line for line in text.splitlines() if line.strip()), "")
-    delimiter = "\t" if is_workbook else max(",;\t|", key=first.count)
+    stated = _SEP.match(text)
+    delimiter = "\t" if is_workbook else stated[1] if stated else max(",;\t|", key=first.count)
     quoting: Any = csv.QUOTE_NONE if is_workbook else csv.QUOTE_MINIMAL
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, quoting=quoting)
     names: list[str] = []
@@ -142,7 +144,7 @@ def read_table(path: Path, file: str) -> tuple[list[str], int, list[TestRow]]:
     try:
         for cells in reader:
             stripped = [cell.strip() for cell in cells]
-            if not any(stripped):
+            if not any(stripped) or (stated and reader.line_num == 1):
                 continue
             if not names:
                 names, header_row = stripped, reader.line_num

@@ -189,7 +189,17 @@ def next_test_of(
     best = named.causes[-1][0]
     others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
     certain = weights_of([best, *others])[0] >= CERTAIN
-    return (confirming_test(best) if certain else None) or next_test([best, *others])
+    return (settling_test(best) if certain else None) or next_test([best, *others])
+
+
+def settling_test(cause: CauseCandidate) -> NextTest | None:
+    """For a cause without a rival, a test of the cause itself: values of its column that were not measured, its
+    amplitude measured directly, pulls without it, or its column varied alone; None where only loads could tell more."""
+    own = (cause.name,)
+    column = cause.acting.mechanism.column(cause.acting.choice)
+    alone = column in ("specimen_run", *cause.fit.setup.observations.conditions.columns)
+    tests = confirming_test(cause), _measuring(cause, own), _removing(cause, own)
+    return next(filter(None, tests), first_test_of(column) if alone else None)
 
 
 def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
@@ -203,29 +213,7 @@ def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
         return None
     first, second = tied[0], tied[1]
     separates = first.name, second.name
-    options = []
-    for candidate in (first, second):
-        acting, m = candidate.acting, candidate.acting.mechanism.measurement
-        if m is not None and acting.measured is None:
-            size = acting.mechanism.amplitude
-            measured = ":".join(filter(None, (acting.mechanism.name, acting.choice)))
-            design: dict[str, Any] = {"measure": measured, "parameter": size.name, "unit": size.unit}
-            design |= {"uncertainty": m.uncertainty, "hours": m.hours}
-            distance2 = float(((candidate.values[0] - size.zero) / m.uncertainty) ** 2)
-            options.append(NextTest("measure", separates, design, bits(distance2)))
-    for candidate in (first, second):
-        f = candidate.fit
-        if not candidate.acting.mechanism.removed_by:
-            continue
-        change = effect_of(f.setup, f.law, candidate.acting, candidate.values)
-        sample = f.setup.observations.conditions.sample
-        strongest = max(set(sample.tolist()), key=lambda name: np.abs(change[sample == name]).mean())
-        rows = np.flatnonzero(sample == strongest)
-        rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
-        test_ids = [str(name) for name in f.setup.observations.test_ids[rows]]
-        design = {"without": candidate.acting.mechanism.name, "sample": strongest, "repeat_tests": test_ids}
-        design |= {"pulls": len(rows), "hours": 1.0 + len(rows) * HOURS_PER_PULL}
-        options.append(NextTest("remove", separates, design, bits(_distance2(f, change[rows], rows))))
+    options = [test for make in (_measuring, _removing) for c in (first, second) if (test := make(c, separates))]
     conditions = first.fit.setup.observations.conditions
     loads = np.unique(np.round(conditions.normal_load_N, 5))
     for name in np.unique(conditions.sample):
@@ -240,6 +228,35 @@ def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
                 NextTest("pull further", separates, design, bits(_distance2(first.fit, difference, rows)))
             )
     return max(options, key=lambda option: option.expected_bits / float(option.design["hours"]))
+
+
+def _measuring(candidate: CauseCandidate, separates: tuple[str, ...]) -> NextTest | None:
+    """The amplitude of a candidate measured directly; None where it was, or where nothing measures it."""
+    acting, m = candidate.acting, candidate.acting.mechanism.measurement
+    if m is None or acting.measured is not None:
+        return None
+    size = acting.mechanism.amplitude
+    measured = ":".join(filter(None, (acting.mechanism.name, acting.choice)))
+    design: dict[str, Any] = {"measure": measured, "parameter": size.name, "unit": size.unit}
+    design |= {"uncertainty": m.uncertainty, "hours": m.hours}
+    distance2 = float(((candidate.values[0] - size.zero) / m.uncertainty) ** 2)
+    return NextTest("measure", separates, design, bits(distance2))
+
+
+def _removing(candidate: CauseCandidate, separates: tuple[str, ...]) -> NextTest | None:
+    """Pulls of the most affected sample repeated without a candidate; None where it cannot be removed."""
+    f = candidate.fit
+    if not candidate.acting.mechanism.removed_by:
+        return None
+    change = effect_of(f.setup, f.law, candidate.acting, candidate.values)
+    sample = f.setup.observations.conditions.sample
+    strongest = max(set(sample.tolist()), key=lambda name: np.abs(change[sample == name]).mean())
+    rows = np.flatnonzero(sample == strongest)
+    rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
+    test_ids = [str(name) for name in f.setup.observations.test_ids[rows]]
+    design: dict[str, Any] = {"without": candidate.acting.mechanism.name, "sample": strongest, "repeat_tests": test_ids}
+    design |= {"pulls": len(rows), "hours": 1.0 + len(rows) * HOURS_PER_PULL}
+    return NextTest("remove", separates, design, bits(_distance2(f, change[rows], rows)))
 
 
 def confirming_test(cause: CauseCandidate) -> NextTest | None:
