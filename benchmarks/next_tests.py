@@ -26,6 +26,7 @@ import numpy as np  # after blind_cases, which says how many threads it may use 
 import pandas as pd  # isort: skip
 from blind import hidden_laws  # isort: skip
 from blind.tribometer import Bench, hide, with_further  # isort: skip
+from figures.against_verdict import contradictions  # isort: skip
 from scipy.stats import f as f_distribution  # isort: skip
 
 if TYPE_CHECKING:
@@ -132,8 +133,8 @@ class Laboratory:
             return hidden_laws.as_ingested(self.bench, self.case.seed, np.ones(len(self.bench.tests), bool))
         return campaign(self.bench, self.measured, self.case.seed)
 
-    def verdict(self) -> Verdict:
-        """As `tribo diagnose` makes it, with its words."""
+    def verdict(self, against: list[str] | None = None) -> Verdict:
+        """As `tribo diagnose` makes it, with its words; what its figures say ``against`` it is added to the list."""
         from tribo import stages
         from tribo.diagnostics.conclusion import cannot_tell
         from tribo.diagnostics.diagnosis import examine
@@ -149,7 +150,10 @@ class Laboratory:
             return stages.diagnosis_without_model(study).verdict
         if (lacking := cannot_tell(whole)) is not None:
             return worded(lacking)
-        return worded(with_laws(examine(whole, seed=self.case.seed), seed=self.case.seed).verdict)
+        d = with_laws(examine(whole, seed=self.case.seed), seed=self.case.seed)
+        if against is not None:
+            against += contradictions(d)
+        return worded(d.verdict)
 
     # ------------------------------------------------------------------------------------------ carrying out
 
@@ -453,10 +457,12 @@ def work(piece: Piece) -> dict[str, Any]:
 
     begin = time.process_time()
     lab = Laboratory(piece)
-    before = lab.verdict()
+    against: list[str] = []
+    before = lab.verdict(against)
     row = {
         "kind": piece.kind, "hidden": piece.hidden, "cell": piece.case.cell, "seed": piece.case.seed,
         "verdict": before.verdict, "headline": before.sentence, "named": sorted(map(sorted, alternatives(before))),
+        "against_verdict": against,
     }  # fmt: skip
     test = before.next_test
     if test is None:
@@ -496,7 +502,11 @@ def table(rows: list[dict[str, Any]]) -> str:
             part = [r for r in made if r[key] == name]
             lines.append(f"| {'test: ' if key == 'test' else ''}{name} | {len(part)} | {counts(part)} |")
     without = [r for r in rows if r["test"] == "none"]
-    return "\n".join(lines) + f"\n\n{len(without)} of {len(rows)} verdicts propose no test.\n"
+    drawn = [r for r in rows if "without the model" not in r["kind"] and not r["kind"].startswith("too little")]
+    against = [text for r in drawn for text in r.get("against_verdict", [])]
+    said = f"{len(without)} of {len(rows)} verdicts propose no test."
+    figures = f"Figures against their verdict: {len(against)} in {len(drawn)} campaigns."
+    return "\n".join([*lines, "", said, figures, *(f"- {text}" for text in against)]) + "\n"
 
 
 def main() -> None:

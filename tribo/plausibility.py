@@ -426,7 +426,7 @@ def _exports(ingested: Ingested) -> Iterator[Doubt]:
         place, slip = f"{_TABLE}, column file", "exports or rows may be exchanged"
         yield Doubt("file", "the test named in the export", _listed([*other.values()]), "that of its row", place, slip)
     arms = [t.test_id for t in ingested.campaign.tests if t.correction.lever_arm_m is not None]
-    sources = [trace.source for name in arms if (trace := ingested.traces.get(name)) is not None]
+    sources = [ingested.traces[name].source for name in arms if name in ingested.traces]
     reasons = [why for source in sources if source is not None for why in source.reasons.values()]
     if reasons and not any("lever arm" in why for why in reasons):
         place, slip = f"{_TOML}, lever_arm_mm", "the exports record a force: leave the lever arm out?"

@@ -13,6 +13,7 @@ from diagnose.test_scatter import off
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from figures.against_verdict import contradictions
 from figures.test_figures import collisions
 from tribo.diagnostics import Diagnosis, examine
 from tribo.diagnostics.fit import fit, residual_on_flat
@@ -94,6 +95,31 @@ def test_the_picture_of_chance_does_not_deny_a_misfit_of_the_samples(
 
     assert answer(nothing) == "no"
     assert answer(patterns_off) == "means: yes, else: no"
+
+
+def test_no_figure_says_the_opposite_of_its_verdict(
+    temperature: Diagnosis, nothing: Diagnosis, patterns_off: Diagnosis
+) -> None:
+    """Forty campaigns of all kinds are checked by benchmarks/next_tests.py."""
+    assert [contradictions(d) for d in (temperature, nothing, patterns_off)] == [[], [], []]
+
+
+def test_a_figure_that_says_the_opposite_is_noticed(
+    temperature: Diagnosis, nothing: Diagnosis, patterns_off: Diagnosis
+) -> None:
+    """Each figure beside the verdict of another campaign, or of the same one with the opposite sign."""
+    first, *others = patterns_off.verdict.misfits
+    turned = replace(first, effect_percent=-first.effect_percent, low=-first.high, high=-first.low)
+    wrong = {
+        "picture of chance says yes": replace(temperature, verdict=nothing.verdict),
+        "bars name": replace(temperature, verdict=nothing.verdict),
+        "cells are marked": replace(temperature, verdict=nothing.verdict),
+        "picture of chance says no": replace(nothing, verdict=temperature.verdict),
+        "its cell": replace(patterns_off, verdict=replace(patterns_off.verdict, misfits=(turned, *others))),
+    }
+    for said, d in wrong.items():
+        assert any(said in text for text in contradictions(d)), said
+    assert any("no misfit, and p" in text for text in contradictions(wrong["bars name"]))
 
 
 def test_the_mean_of_a_pattern_that_rubs_more_is_that_much_higher_and_no_other_is(nothing: Diagnosis) -> None:

@@ -14,6 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from tribo.figures import style
 from tribo.figures.misfit import mechanism_label, pattern_differences
+from tribo.mechanisms.record import TraceEvidence
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
@@ -142,23 +143,47 @@ POWER_FRAME_MM = 26.0
 def power_numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
     """Chance: the strongest deviation in each simulated campaign without effect. Observed: the strongest in this one.
 
-    Means: by how many times its stated error the patterned samples differ from the model, where this is certain. Then
-    one row per mechanism: the effect on T, in percent over the range of the variable, that is detected with 10, 50 and
-    90 % probability. The strength of a deviation is proportional to the effect and has a standard deviation of 1.
+    Answer: whether there is a misfit, as the verdict says. Means: by how many times its stated error the patterned
+    samples differ from the model, where this is certain. Then one row per mechanism: the effect on T, in percent over
+    the range of the variable, that is detected with 10, 50 and 90 % probability. The strength of a deviation is
+    proportional to the effect and has a standard deviation of 1.
     """
     chance = [("chance", "", float(z), *[float("nan")] * 3) for z in d.screened.chance]
     best = int(np.argmax(d.screened.strength))
-    need = float(np.quantile(d.screened.chance, 1 - level)) if len(chance) else 3.7
+    level = level * d.share_of_level
+    need = _needed(d, level) if len(chance) else 3.7
     contrast = d.screened.contrasts[best]
     seen, nothing = float(d.screened.strength[best]), [float("nan")] * 3
     rows = [*chance, ("need", f"level {level:g}", need, *nothing)]
     rows.append(("observed", f"{contrast.observable}, {contrast.title}", seen, *nothing))
+    rows.append(("answer", _answer(d, level), float("nan"), *nothing))
     if pattern_differences(d):
         rows.append(("means", "means of the patterned samples", d.verdict.shows.excess[0], *nothing))
     for name, percent in sorted(d.verdict.smallest_effects.items(), key=lambda item: item[1])[:SHOWN]:
         low, high = (percent * (need + s * TENTH) / need for s in (-1, 1))
         rows.append(("mechanism", name, float("nan"), low, percent, high))
     return pd.DataFrame(rows, columns=POWER_COLUMNS)
+
+
+def _needed(d: Diagnosis, level: float) -> float:
+    """The strength at which a deviation is a misfit, by the p value of the verdict."""
+    low, high = 0.0, float(d.screened.chance.max()) + 10.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (low, middle) if d.screened.p_adjusted(middle) < level else (middle, high)
+    return high
+
+
+def _answer(d: Diagnosis, level: float) -> str:
+    """Whether a deviation of the picture is a misfit; before it, what else the verdict rests on."""
+    strongest = "yes" if d.screened.p.min() < level else "no"
+    beside = {
+        "means": bool(pattern_differences(d)),
+        "traces": any(isinstance(c.shows, TraceEvidence) for c in d.verdict.causes),
+        "law": any(layer.kind == "law" for layer in d.verdict.layers),
+    }
+    said = [f"{name}: yes" for name, there in beside.items() if there]
+    return ", ".join([*said, f"else: {strongest}"]) if said else strongest
 
 
 @style.in_house_style
@@ -195,10 +220,7 @@ def _chance(ax: Axes, numbers: pd.DataFrame) -> None:
         ax.hist(chance, bins=edges.tolist(), color="0.75")
     ax.axvline(need, color="black", ls="--", lw=0.9)
     ax.axvline(observed, color=style.VERMILLION, lw=1.6)
-    answer = "yes" if observed > need else "no"
-    if (numbers["mark"] == "means").any():
-        answer = f"means: yes, else: {answer}"
-    style.panel_title(ax, "A misfit?", answer)
+    style.panel_title(ax, "A misfit?", str(numbers.loc[numbers["mark"] == "answer", "name"].iloc[0]))
     ax.set_xlabel("Strongest deviation (standard deviations)")
     ax.set_ylabel("Campaigns")
 

@@ -390,8 +390,12 @@ def next_test_sentence(t: NextTest) -> str:
             return f"Repeat pulls of the beginning of the series after all others, to separate {others}: {pulls} pulls."
         return f"Choose the values of {in_words(varied_one)} at random, independently of {others}: {pulls} pulls."
     if t.kind == "part from load":
-        names = _listed([in_words(name) for name in t.separates if name != "normal_load_N"])
-        return f"To tell {names} from the load, repeat four loads of the range, three times each, in random order."
+        columns = [name for name in t.separates if name != "normal_load_N"]
+        names = _listed([in_words(name) for name in columns])
+        loads = "four loads of the range, three times each, in random order"
+        if set(columns) <= set(SERIES):
+            return f"To tell {names} from the load, repeat {loads}."
+        return f"Choose {names} independently of the load: {loads}."
     return (
         "Print T at every load, or the covariance of mu and tau0, which decides what is beyond chance. At the bench: "
         f"{t.shows}"
