@@ -14,7 +14,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from tribo.figures import style
 from tribo.figures.misfit import mechanism_label, pattern_differences
-from tribo.mechanisms.record import TraceEvidence
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
@@ -137,6 +136,7 @@ POWER_COLUMNS = ["mark", "name", "strength", "found_10_percent", "found_50_perce
 LEVEL = 0.01  # chance of a misfit where nothing is hidden, as the diagnosis takes it by default
 TENTH = 1.2816  # standard normal deviate exceeded one time in ten
 SHOWN = 16
+OF_TRACES = ("zero", "rise")  # observables of a misfit that no force shows
 POWER_FRAME_MM = 26.0
 
 
@@ -179,7 +179,7 @@ def _answer(d: Diagnosis, level: float) -> str:
     strongest = "yes" if d.screened.p.min() < level else "no"
     beside = {
         "means": bool(pattern_differences(d)),
-        "traces": any(isinstance(c.shows, TraceEvidence) for c in d.verdict.causes),
+        "traces": any(m.observable in OF_TRACES for m in d.verdict.misfits),
         "law": any(layer.kind == "law" for layer in d.verdict.layers),
     }
     said = [f"{name}: yes" for name, there in beside.items() if there]
