@@ -406,7 +406,6 @@ ACROSS_PATTERNS = {
     "nested_error": "error with the choice of the law left out as well",
     "laws_tried": "number of laws tried",
 }
-STUDY_STAGES = ("ingest", "fit", "compare", "diagnose", "report")
 PRODUCTS = (
     Product(
         "tests.csv", "ingest",

@@ -211,7 +211,6 @@ def corrections_of_report(folder: Path, flat: str) -> dict[str, tuple[float, flo
 
 
 _UM = 1e-6
-MOST_ASPECT = 60.0
 
 
 @dataclass(frozen=True)

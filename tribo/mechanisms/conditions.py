@@ -83,11 +83,6 @@ class Gaps:
     expected: FloatArray
     draws: FloatArray
 
-    @property
-    def recorded_share(self) -> float:
-        """Share of the tests with a value."""
-        return float(1.0 - self.missing.mean())
-
     def mean_of(self, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """The mean over the draws of a function of numbers (n,), of any shape."""
         return np.asarray(np.mean([function(draw) for draw in self.draws.T], axis=0))
