@@ -42,6 +42,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("fitting", GROUND),
     ("plausibility", GROUND),
     ("springblock", GROUND | {"campaign", "cache"}),
+    ("slider", GROUND | {"springblock"}),
     ("mechanisms", GROUND),
     ("mechanisms_in_model", GROUND | {"mechanisms", "springblock"}),
     ("comparison", GROUND | {"fitting", "springblock", "cache"}),

@@ -22,6 +22,7 @@ from .records import (
     Trace as Trace,
 )
 from .report import verify as verify, write_report as write_report
+from .slider import SliderConfig as SliderConfig, SliderRun as SliderRun, simulate_slider as simulate_slider
 from .springblock import (
     SimConfig as SimConfig,
     calibrate as calibrate,

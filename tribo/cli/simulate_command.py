@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cli.console import FORCE, WAIT, Console, GivenPath, command_options
+from tribo.cli.slider_command import OWN, simulate_sliders, slider_options
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,6 +60,7 @@ def _described(command: Any) -> Any:
 
 @click.command()
 @_described
+@slider_options
 @click.option(
     "--design",
     type=GivenPath(dir_okay=False),
@@ -91,7 +93,16 @@ def simulate(
     run; FILE.nc then holds force against time. Several samples or pressures, --repeats, --design or --table2 give an
     ensemble; FILE.nc then holds one entry per run. If the same command is started again, it computes only the missing
     runs.
+
+    With --slider, a rigid slider is pulled through a spring instead, under the friction law of --law; FILE.nc then
+    holds force, position and speed over time. Several values of a parameter (--set) or --design give an ensemble.
     """
+    own = {name: options.pop(name) for name in OWN}
+    if own.pop("slider"):
+        _slider(console, own, design, table2, mechanisms, out, options)
+        return
+    if named := [name for name, value in own.items() if value is not None]:
+        raise click.UsageError(f"{', '.join(named)}: only with --slider")
     from tribo.cache.own_folder import check_file, only_writer_of
     from tribo.display import exact_text
     from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
@@ -134,6 +145,18 @@ def simulate(
                 runs, out, jobs, scheduler, partial(progress, "simulating"), work, console.wait_s
             )  # fmt: skip
         _say_ensemble(console, ran, out, table2)
+
+
+def _slider(
+    console: Console, own: dict[str, Any], design: Path | None, table2: bool, mechanisms: str, out: Path,
+    options: dict[str, Any],
+) -> None:  # fmt: skip
+    """The run of a slider; options that describe blocks are wrong usage."""
+    scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
+    own |= {name: options.pop(name) for name in ("settings", "duration_ms")}
+    if table2 or mechanisms or any(value not in (None, ()) for value in options.values()):
+        raise click.UsageError("--slider cannot be combined with options of the spring-block model")
+    simulate_sliders(console, own, design, out, seed, jobs, scheduler)
 
 
 def pulled(
