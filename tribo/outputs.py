@@ -26,7 +26,7 @@ UNIT_ENDINGS = {
     "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_mm_s": "mm/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
     "_N": "N",
     "_N_per_decade": "N", "_per_m": "1/m", "_J": "J",
-    "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
+    "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_um": "um", "_pct": "percent",
     "_percent": "percent",
 }  # fmt: skip
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
@@ -170,6 +170,23 @@ PHASES = {
     "u_N": "its standard uncertainty",
     "evidence": "what tells of its beginning",
     "doubt": "what is doubtful about it",
+}
+EVENTS = {
+    "test_id": "the test",
+    "event": "number of the slip in the test",
+    "start_s": "start of its loading: the end of the slip before, or the onset of a pull from rest",
+    "fail_s": "its failure: the time of the highest force",
+    "end_s": "its end: the time of the lowest force",
+    "stiffness_N_per_m": "slope of its loading against the way of the drive, from 20 to 65 % of the loading",
+    "points": "number of data points of that slope",
+    "drop_N": "force lost from failure to end",
+    "slip_um": "way of the slider from failure to end in um",
+    "duration_s": "time from failure to end; empty below four data points",
+    "peak_velocity_mm_s": "highest velocity of the slider; empty below four data points",
+    "precursory_slip_um": "creep before the failure in um: what the force lacks from its loading line, over the "
+    "stiffness",
+    "recurrence_s": "time since the failure before",
+    "hold_s": "time at rest before the failure: since the end of the slip before, or while the drive stood still",
 }
 RECORD_READINGS = {
     "test_id": "the test, or the record whose strokes are tests of their own",
@@ -425,6 +442,12 @@ PRODUCTS = (
         PHASES, "tribo.report.tables:phases_table", "phases", "phase_row",
     ),
     Product(
+        "events.csv", "ingest",
+        "one row per slip of every record, from rest and in stick-slip; a cell is empty where the record does not "
+        "resolve it; see [stick-slip](../howto/stick-slip.md).",
+        EVENTS, "tribo.report.tables:events_table", "events", "event_row",
+    ),
+    Product(
         "readings.csv", "ingest",
         "one row per reading of a record that is more than one pull from rest: plateaus, steps, cycles, running-in and "
         "holds, with 95 % intervals; see [how a record is read](../concepts/records.md).",
@@ -471,9 +494,9 @@ PRODUCTS = (
         "campaign.nc", "ingest",
         "all of the tables above but restarts, laws, dependence and differences, and the traces: HDF5 with units, "
         "readable by h5py and xarray. `xr.open_dataset(\"campaign.nc\")` gives the table of tests; "
-        "`xr.open_datatree(\"campaign.nc\")` also gives the groups `phases`, `fits`, `comparison`, `simulated`, "
-        "`budget` and `traces`. In `traces`, the samples of all traces follow each other: those of trace k begin at "
-        "`row_start[k]` and are `row_size[k]` in number.",
+        "`xr.open_datatree(\"campaign.nc\")` also gives the groups `phases`, `events`, `fits`, `comparison`, "
+        "`simulated`, `budget` and `traces`. In `traces`, the samples of all traces follow each other: those of trace "
+        "k begin at `row_start[k]` and are `row_size[k]` in number.",
         origin_in=(".nc",),
     ),
     Product(

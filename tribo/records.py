@@ -235,6 +235,59 @@ class Oscillation:
     stuck_share_u: float = float("nan")
 
 
+SlipChange = tuple[int, float, float]  # number of a slip (0: added), times of its failure and end (NaN: removed)
+
+
+@displayed(lambda s: f"slip at {s.fail_s:.6g} s, drop {s.drop_N:.4g} N")
+@dataclass(frozen=True)
+class Slip:
+    """One slip of a record; times as recorded in the trace, NaN where a number is not resolved.
+
+    Parameters
+    ----------
+    start_s, fail_s, end_s : float
+        Times in s at which its loading begins (the end of the slip before, or the onset), at which the force is highest
+        and at which it is lowest.
+    stiffness_N_per_m, points : float and int
+        Slope of its loading against the way of the drive in N/m, and the number of data points that it is read from.
+    peak_N, trough_N : float
+        Force before and after the slip in N.
+    slip_m, duration_s, peak_velocity_m_s : float
+        Way of the slider from peak to trough in m, its time in s and its highest velocity in m/s.
+    precursory_slip_m : float
+        Creep in m before the slip: what the force lacks from its loading line, over the stiffness.
+    recurrence_s : float
+        Time in s since the failure before.
+    hold_s : float
+        Time in s that the contact was at rest: from the end of the slip before, or the time that the drive stood still.
+    loading_N_per_s : float
+        The same slope against time in N/s.
+    by_hand : bool
+        Whether a person added or moved it.
+    """
+
+    start_s: float
+    fail_s: float
+    end_s: float
+    stiffness_N_per_m: float
+    points: int
+    peak_N: float
+    trough_N: float
+    slip_m: float
+    duration_s: float
+    peak_velocity_m_s: float
+    precursory_slip_m: float
+    recurrence_s: float
+    hold_s: float
+    loading_N_per_s: float = float("nan")
+    by_hand: bool = False
+
+    @property
+    def drop_N(self) -> float:
+        """Force lost in N."""
+        return self.peak_N - self.trough_N
+
+
 @displayed(lambda p: f"{p.test_id}, static {p.static_N:.4g} N, sliding {p.sliding_N:.4g} N")
 @dataclass(frozen=True)
 class Pull:
@@ -284,6 +337,8 @@ class Pull:
         Static friction after every stop within the record.
     phases : tuple of Phase
         The parts of the record, in order of time.
+    slips : tuple of Slip
+        The slips of the record, in order of time.
 
     Examples
     --------
@@ -320,6 +375,7 @@ class Pull:
     oscillation: Oscillation | None = None
     restarts: tuple[Restart, ...] = ()
     phases: tuple[Phase, ...] = ()
+    slips: tuple[Slip, ...] = ()
 
 
 STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
@@ -640,7 +696,8 @@ class Campaign:
 @displayed(lambda o: f"{o.test_id}: {o.action}")
 @dataclass(frozen=True)
 class Override:
-    """A decision made by hand about one test: exclude it, move its static peak or sliding window, or state phases.
+    """A decision made by hand about one test: exclude it, move its static peak or sliding window, state phases, or
+    remove, add or move slips.
 
     Times as recorded in the trace; None where the automatic value is kept. ``automatic`` is the result without the
     decision, without any number where the test had been set aside; ``trace`` is None where the forces were evaluated
@@ -648,13 +705,14 @@ class Override:
     """
 
     test_id: str
-    action: Literal["exclude", "move", "phase"]
+    action: Literal["exclude", "move", "phase", "event"]
     automatic: Pull
     trace: Trace | None = None
     reason: str = ""
     window_s: tuple[float, float] | None = None
     peak_s: float | None = None
     phases: tuple[Phase, ...] = ()
+    slips: tuple[SlipChange, ...] = ()
 
 
 @displayed(lambda i: f"{i.campaign.title}, {len(i.pulls)} pulls, {len(i.set_aside)} tests set aside")
@@ -886,6 +944,8 @@ __all__ = [
     "Restart",
     "Run",
     "SetAside",
+    "Slip",
+    "SlipChange",
     "Study",
     "Test",
     "Trace",

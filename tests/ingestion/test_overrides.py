@@ -232,3 +232,38 @@ def test_every_fault_of_a_stated_phase_is_named(with_a_slide: Ingested, tmp_path
     assert found == {
         (2, "unknown_phase"), (3, "window_reversed"), (4, "half_a_window"), (5, "outside_trace"), (6, "duplicate_row"),
     }  # fmt: skip
+
+
+EVENTS = "test_id,action,reason,event,fail_s,end_s,window_start_s,window_end_s"
+
+
+def test_a_slip_is_taken_out_by_its_number_and_one_added_beside_a_moved_window(
+    ingested: Ingested, tmp_path: Path
+) -> None:
+    pull = ingested.pulls["T005"]
+    (slip,) = pull.slips
+    added = f"T005,event,late slip,,{pull.window_s[0] + 1.0},{pull.window_s[0] + 1.2},,"
+    moved = f"T005,move,drift,,,,{pull.window_s[0] + 0.5},{pull.window_s[1]}"
+    path = written(tmp_path, "T005,event,a knock,1,,,,", added, moved, "T006,event,a knock,1,,,,", header=EVENTS)
+    decided = apply_overrides(ingested, path, "first_peak")
+    assert decided.pulls["T006"].slips == ()
+    assert slip.fail_s not in [s.fail_s for s in decided.pulls["T005"].slips]
+    assert decided.pulls["T005"].window_s != pull.window_s
+    said = by_hand_sentence(decided.by_hand["T006"], decided.pulls["T006"])
+    assert said.startswith("Changed by hand (a knock): slip 1 taken out.")
+
+
+@pytest.mark.parametrize(
+    ("row", "kind"),
+    [
+        ("T005,event,why,7,,,,", "unknown_event"),
+        ("T005,event,why,one,,,,", "unknown_event"),
+        ("T005,event,,1,,,,", "no_reason"),
+        ("T005,event,why,1,4.0,,,", "half_a_slip"),
+        ("T005,event,why,,,,,", "half_a_slip"),
+        ("T005,event,why,,5.0,4.0,,", "window_reversed"),
+        ("T005,event,why,,5.0,4000,,", "outside_trace"),
+    ],
+)
+def test_a_slip_that_cannot_be_changed_so_is_refused(ingested: Ingested, tmp_path: Path, row: str, kind: str) -> None:
+    assert [p.kind for p in faults(ingested, written(tmp_path, row, header=EVENTS))] == [kind]

@@ -25,7 +25,7 @@ from tribo.zeroing import zero_choice
 from .synthetic import Shape, with_samples
 
 FROM_REST = Test("T", "", "", math.nan, "", zero=zero_choice("before contact"))
-LEFT_OUT = {"test_id", "rule", "zero_rule", "oscillation", "phases", "recorded_load_N", "recorded_load_u_N"}
+LEFT_OUT = {"test_id", "rule", "zero_rule", "oscillation", "phases", "slips", "recorded_load_N", "recorded_load_u_N"}
 KEPT = Path(__file__).with_name("kept_readings.json")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -113,12 +114,13 @@ def draw_examples(numbers: pd.DataFrame) -> Figure:
 
 
 def pull_numbers(trace: Trace, pull: Pull) -> pd.DataFrame:
-    """Force (N, zero subtracted) against time (s, as recorded), with the peak and the ends of the window."""
+    """Force (N, zero subtracted) against time (s, as recorded), with the peak, the ends of the window and the slips."""
     time, force = thin_trace(trace.time_s, trace.force_N - pull.zero_N)
     marks = [("trace", t, f) for t, f in zip(time, force, strict=True)]
     marks.append(("peak", pull.peak_s, pull.static_N))
     marks += [("window", t, pull.sliding_N) for t in pull.window_s]
     marks += [(f"phase: {phase.name}", t, np.nan) for phase in pull.phases for t in (phase.start_s, phase.end_s)]
+    marks += [("slip", t, f) for s in pull.slips for t, f in ((s.fail_s, s.peak_N), (s.end_s, s.trough_N))]
     frame = pd.DataFrame(marks, columns=["mark", "time_s", "force_N"])
     frame.insert(0, "test_id", pull.test_id)
     return frame
@@ -139,7 +141,7 @@ def _draw_phases(ax: Axes, phases: pd.DataFrame) -> None:
 
 @style.in_house_style
 def draw_pull(numbers: pd.DataFrame) -> Figure:
-    """The trace with its readings, and under it the phases of the record."""
+    """The trace with its readings and slips, and under it the phases of the record."""
     figure, (ax,) = style.panel_grid(1, 75)
     trace, peak, window = (numbers[numbers["mark"] == m] for m in ("trace", "peak", "window"))
     ax.plot(trace["time_s"], trace["force_N"], color=style.BLUE, lw=0.8, label="friction force, zero subtracted")
@@ -147,6 +149,10 @@ def draw_pull(numbers: pd.DataFrame) -> Figure:
     ax.plot(window["time_s"], window["force_N"], color=style.GREEN, lw=1.6, label="sliding window and mean")
     ax.plot(peak["time_s"], peak["force_N"], "v", color=style.VERMILLION, ms=6, label="static peak", clip_on=False)
     style.panel_title(ax, str(numbers["test_id"].iloc[0]))
+    slips = numbers[numbers["mark"] == "slip"]
+    if len(slips):
+        ends = slips[["time_s", "force_N"]].to_numpy(float).reshape(-1, 2, 2)
+        ax.add_collection(LineCollection(list(ends), colors=style.ORANGE, linewidths=1.2, label="slips"), autolim=False)
     _draw_phases(ax, numbers[numbers["mark"].str.startswith("phase: ")])
     ax.set_xlabel("Time (s)")
     ax.set_ylabel("Friction force T (N)")

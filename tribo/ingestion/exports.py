@@ -138,7 +138,9 @@ def read_row(
 
     options = replace(options, test=test)
     if by_hand is not None:
-        options = replace(options, peak_s=by_hand.peak_s, window_s=by_hand.window_s, phases=by_hand.phases)
+        options = replace(
+            options, peak_s=by_hand.peak_s, window_s=by_hand.window_s, phases=by_hand.phases, slips=by_hand.slips
+        )
     outcomes: list[tuple[Test, Outcome]] = []
     measured: list[tuple[Trace | None, PullOptions]] = [(None, options)]
     with hashes_of_reads() as read:

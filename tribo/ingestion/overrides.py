@@ -15,14 +15,15 @@ from tribo.errors import CampaignError, Problem, system_problem
 from tribo.files import LEADS_OUT, leads_out
 from tribo.ingestion.exports import options_of, read_row, stated_columns
 from tribo.input_files import hashes_of_reads
-from tribo.records import PHASES, Ingested, Override, Phase, SetAside, Trace
+from tribo.records import PHASES, Ingested, Override, Phase, Pull, SetAside, Trace
 from tribo.traces.evaluation import unread
 from tribo.user_text import did_you_mean
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
 OF_PHASE = ("start_s", "end_s")
-COLUMNS = ("test_id", "action", "reason", *TIMES, "phase", *OF_PHASE)
-ACTIONS = ("exclude", "move", "phase")
+OF_EVENT = ("fail_s", "end_s")
+COLUMNS = ("test_id", "action", "reason", *TIMES, "phase", *OF_PHASE, "event", "fail_s")
+ACTIONS: tuple[Literal["exclude", "move", "phase", "event"], ...] = ("exclude", "move", "phase", "event")
 LEFT_ASIDE = {"same_numbers", "other_test"}  # an export that belongs to another test; no decision changes that
 FEWEST_IN_WINDOW = 10
 OVERRIDES = "--overrides"  # among the inputs of a campaign; no file of a campaign has this name
@@ -31,9 +32,10 @@ OVERRIDES = "--overrides"  # among the inputs of a campaign; no file of a campai
 def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     """The campaign with overrides.csv applied: pulls excluded, static peaks and windows moved.
 
-    Columns: test_id, action (``exclude``, ``move`` or ``phase``), reason, window_start_s, window_end_s, peak_s, and for
-    a phase its name, start_s and end_s; times on the clock of the trace. A pull excluded is set aside with its reason;
-    a moved one, or one with phases stated, is read again from its export by the same rule, also where it had been set
+    Columns: test_id, action (``exclude``, ``move``, ``phase`` or ``event``), reason, window_start_s, window_end_s,
+    peak_s, for a phase its name, start_s and end_s, and for a slip its number in events.csv and the times fail_s and
+    end_s; times on the clock of the trace. A pull excluded is set aside with its reason; a moved one, or one with
+    phases or slips stated, is read again from its export by the same rule, also where it had been set
     aside. The automatic results are kept in ``by_hand``.
 
     Raises
@@ -115,13 +117,18 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
     read_again = {s.test_id for s in ingested.set_aside if not {p.kind for p in s.problems} & LEFT_ASIDE and s.problems}
     read_again &= {t.test_id for t in ingested.campaign.tests}
     first: dict[str, TestRow] = {}
+    stated: dict[str, list[str]] = {}  # the actions of the rows of a test so far
     found: dict[str, Override] = {}
     for row in rows:
         test_id, action = row.test_id, row.cells.get("action", "")
-        again = test_id in first and {action, first[test_id].cells.get("action", "")} != {"phase"}
+        before = stated.setdefault(test_id, [])
+        others = {*before, action}
+        beside_slips = "exclude" not in others and (action == "event" or set(before) == {"event"})
+        again = bool(before) and others != {"phase"} and not beside_slips
+        before.append(action)
         if again:
             what = f"this test already occurs in row {first[test_id].row}"
-            allowed = "one row per test, or one per phase"
+            allowed = "one row per test, or one per phase, and one per event"
             problems.append(Problem("duplicate_row", what, file, row.row, "test_id", test_id, allowed))
         first.setdefault(test_id, row)
         times, faults = _times(row)
@@ -134,16 +141,20 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
         made = found.get(test_id)
         if made is None:
             automatic = ingested.pulls.get(test_id) or unread(test_id)
-            window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
-            kind: Literal["exclude", "move", "phase"] = (
-                "exclude" if action == "exclude" else "phase" if action == "phase" else "move"
-            )
-            made = Override(test_id, kind, automatic, traces[test_id], reason, window, times.get("peak_s"))
+            made = Override(test_id, "event", automatic, traces[test_id], reason)
         elif reason not in made.reason:
             made = replace(made, reason=f"{made.reason}; {reason}".removeprefix("; "))
+        if action != "event":
+            window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
+            made = replace(
+                made, action=next(a for a in ACTIONS if a == action), window_s=window, peak_s=times.get("peak_s")
+            )
         if action == "phase":
             phase = Phase(row.cells["phase"], times["start_s"], times["end_s"])
             made = replace(made, phases=(*made.phases, phase))
+        if action == "event":
+            fail, end = (times.get(column, math.nan) for column in OF_EVENT)
+            made = replace(made, slips=(*made.slips, (int(row.cells.get("event") or 0), fail, end)))
         found[test_id] = made
     if problems:
         raise CampaignError(problems)
@@ -153,7 +164,7 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
 def _times(row: TestRow) -> tuple[dict[str, float], list[Problem]]:
     """The times given, in seconds, and the cells that hold none."""
     found, problems = {}, []
-    for column in (*TIMES, *OF_PHASE):
+    for column in (*TIMES, *OF_PHASE, "fail_s"):
         cell = row.cells.get(column, "")
         try:
             value = float(cell.replace(",", ".") if row.decimal_comma else cell) if cell else math.nan
@@ -186,13 +197,15 @@ def _row_faults(
             if cell := row.cells.get(column):
                 what = "an excluded test cannot have a peak or window"
                 yield Problem("unused_cell", what, *place, column, cell, "an empty cell")
-    elif action in ("move", "phase") and test_id in ingested.pulls and test_id not in ingested.traces:
+    elif action in ("move", "phase", "event") and test_id in ingested.pulls and test_id not in ingested.traces:
         what = "the forces of this test were evaluated elsewhere, so it has no peak and no window to move"
         yield Problem("no_trace", what, *place, "action", action, "exclude")
     elif action == "move" and times is not None:
         yield from _move_faults(row, times, traces.get(test_id))
     elif action == "phase" and times is not None:
         yield from _phase_faults(row, times, traces.get(test_id))
+    elif action == "event" and times is not None:
+        yield from _event_faults(row, times, traces.get(test_id), ingested.pulls.get(test_id))
 
 
 def _phase_faults(row: TestRow, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
@@ -207,6 +220,31 @@ def _phase_faults(row: TestRow, times: Mapping[str, float], trace: Trace | None)
         found, allowed = row.cells["end_s"], f"more than {times['start_s']:g}"
         yield Problem("window_reversed", "the phase must end after its start", *place, "end_s", found, allowed)
     yield from _outside(row, {column: times[column] for column in OF_PHASE}, trace)
+
+
+def _event_faults(
+    row: TestRow, times: Mapping[str, float], trace: Trace | None, pull: Pull | None
+) -> Iterator[Problem]:
+    """A number alone removes a slip, two times alone add one, all three move it."""
+    place, cell = (row.file, row.row), row.cells.get("event", "")
+    count = len(pull.slips) if pull else 0
+    if cell and not (cell.isdecimal() and 1 <= int(cell) <= count):
+        allowed = f"1 to {count}, as in events.csv" if count else "no number: this test has no slips"
+        yield Problem("unknown_event", "the test has no slip of this number", *place, "event", cell, allowed)
+    given = [column for column in OF_EVENT if column in times]
+    if len(given) == 1 or not (given or cell):
+        missing = next(column for column in OF_EVENT if column not in times)
+        yield Problem(
+            "half_a_slip", "a slip needs the times of its failure and its end", *place, missing, "", "seconds"
+        )
+    if not row.cells.get("reason"):
+        yield Problem("no_reason", "a slip changed by hand needs a reason", *place, "reason", "", "a short text")
+    if len(given) == 2:
+        if not times["fail_s"] < times["end_s"]:
+            found, allowed = row.cells["end_s"], f"more than {times['fail_s']:g}"
+            yield Problem("window_reversed", "the slip must end after its failure", *place, "end_s", found, allowed)
+            return
+        yield from _outside(row, {column: times[column] for column in OF_EVENT}, trace)
 
 
 def _move_faults(row: TestRow, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:

@@ -139,6 +139,7 @@ def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
 
 TRACE_BYTES = 2_000_000  # all traces together
 FULL_SCALE = 65535
+MOST_SLIPS = 300
 MOST_PHASES = 200  # drawn of one pull; all stand in phases.csv
 
 
@@ -153,12 +154,20 @@ def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
     pull, trace, decided = reading(study, test_id)
     record = _trace_record(trace, pull, points) | _marks(pull)
     record["phases"] = [[p.name, _short(p.start_s), _short(p.end_s)] for p in pull.phases[:MOST_PHASES]]
+    if pull.slips:
+        step = -(-len(pull.slips) // MOST_SLIPS)
+        lines = [(s.fail_s, s.peak_N, s.end_s, s.trough_N) for s in pull.slips[::step]]
+        record["slips"] = [[_short(value) for value in line] for line in lines]
     doubts = doubted_s(trace, pull)
     if doubts:
         record["doubts"] = [[_short(time), "; ".join(what)] for time, what in doubts.items()]
     if decided is not None:
         record["automatic"] = _marks(decided.automatic)
-        record["decided"] = _decision(decided)
+        if decided.action != "event":
+            record["decided"] = _decision(decided)
+        if decided.slips:  # kept by the page, which does not change them
+            rows = [(n or "", decided.reason, *("" if math.isnan(t) else t for t in at)) for n, *at in decided.slips]
+            record["slips_by_hand"] = [list(row) for row in rows]
     return record
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
 
 _OF_TEST = {field.name for field in fields(Test)}
-_OF_PULL = {field.name for field in fields(Pull)} - {"flags", "restarts"}
+_OF_PULL = {field.name for field in fields(Pull)} - {"flags", "restarts", "slips"}
 
 
 def tables_of(study: Study, diagnosis: Diagnosis | None = None) -> dict[str, pd.DataFrame]:
@@ -53,8 +53,8 @@ def write_tables(
     Returns
     -------
     list of Path
-        tests.csv, and restarts, phases, readings, fits, other_fits, laws, dependence, budget, differences, comparison,
-        diagnosis and layers as far as the study went.
+        tests.csv, and restarts, phases, events, readings, fits, other_fits, laws, dependence, budget, differences,
+        comparison, diagnosis and layers as far as the study went.
     """
     made = tables_of(study, diagnosis) if tables is None else tables
     return [outputs.write(out, name, table) for name, table in made.items()]
@@ -152,6 +152,21 @@ def phases_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | Non
         for p in pulls[test.test_id].phases
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=outputs.product("phases.csv").column_names) if rows else None
+
+
+def events_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """One row per slip of every record that was read; None where there is none."""
+    pulls = study.ingested.pulls
+    rows = [
+        (
+            test.test_id, number, s.start_s, s.fail_s, s.end_s, s.stiffness_N_per_m, s.points, s.drop_N, 1e6 * s.slip_m,
+            s.duration_s, 1e3 * s.peak_velocity_m_s, 1e6 * s.precursory_slip_m, s.recurrence_s, s.hold_s,
+        )
+        for test in study.ingested.campaign.tests
+        if test.test_id in pulls
+        for number, s in enumerate(pulls[test.test_id].slips, start=1)
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=outputs.product("events.csv").column_names) if rows else None
 
 
 def readings_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:

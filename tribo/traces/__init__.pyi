@@ -5,6 +5,7 @@ from .evaluation import (
     pieces_of as pieces_of,
     read_pulls as read_pulls,
 )
+from .events import slips_of as slips_of
 from .phases import phases_of as phases_of
 from .rules import RULES as RULES, Rule as Rule
 from .sliding import oscillation_of as oscillation_of

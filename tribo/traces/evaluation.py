@@ -17,9 +17,10 @@ import numpy as np
 
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
-from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Test, Trace
+from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Slip, SlipChange, Test, Trace
 from tribo.traces.cuts import directions_of, piece_of, reversals, split_pulls
 from tribo.traces.drive import FEWEST_AT_REST, drive_of, speed_level_m_s
+from tribo.traces.events import changed_by_hand, slips_of
 from tribo.traces.loading import Zero, loading_of, starting_level
 from tribo.traces.peak import (
     Apex,
@@ -61,6 +62,7 @@ _OF_STATIC = (
     "static_N", "static_u_N", "onset_s", "peak_s", "rise_N_per_s", "rise_stiffness_N_per_m", "first_maximum_N",
     "highest_N", "first_drop_N",
 )  # what a pull without a static force does not have  # fmt: skip
+_MOTION = {"rise", "slip", "running-in", "steady sliding", "stroke"}  # phases in which the force may slip
 _OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 
@@ -93,6 +95,8 @@ class PullOptions:
     phases : tuple of Phase
         Phases stated by hand: the end of a rise is a static peak, steady sliding the window of the sliding force, a
         rest the zero. A record for which sliding from its beginning is stated, and no rise, has no static force.
+    slips : tuple of SlipChange
+        Slips removed, added or moved by hand.
     """
 
     rule: str = DEFAULT_RULE
@@ -106,6 +110,7 @@ class PullOptions:
     peak_s: float | None = None
     window_s: tuple[float, float] | None = None
     phases: tuple[Phase, ...] = ()
+    slips: tuple[SlipChange, ...] = ()
 
 
 WHOLE = PullOptions()
@@ -191,8 +196,9 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
         phases=_phases(trace, pull, signal, course, options),
         problems=tuple(p.at(file=trace.file or None, test_id=test.test_id) for p in (*doubts, *pull.problems)),
     )  # fmt: skip
+    pull = replace(pull, slips=_slips(pull, signal, test, options.slips))
     if "no_time" in trace.flags:  # path stands for time, so nothing can be counted per second
-        pull = replace(pull, rise_N_per_s=math.nan, stick_slip_period_s=math.nan, drift_N_per_s=math.nan)
+        pull = replace(pull, rise_N_per_s=math.nan, stick_slip_period_s=math.nan, drift_N_per_s=math.nan, slips=())
     return pull
 
 
@@ -614,6 +620,56 @@ def _with_oscillation(pull: Pull, trace: Trace, signal: Signal, test: Test) -> P
     return replace(
         pull, oscillation=found, stick_slip_amplitude_N=found.drop_N, stick_slip_period_s=found.period_s, flags=flags
     )
+
+
+def _slips(pull: Pull, signal: Signal, test: Test, by_hand: Sequence[SlipChange]) -> tuple[Slip, ...]:
+    """The slips of every motion of a record, each read with the speed of its phases, then what a person changed."""
+    held, stiffness = test.hold_s, test.stiffness_N_per_m or math.nan
+    motions: list[list[Phase]] = []
+    joined = False
+    for phase in pull.phases:
+        if phase.name == "hold":
+            held = phase.end_s - phase.start_s
+        if phase.name in _MOTION:
+            if not joined or phase.name in ("rise", "stroke"):
+                motions.append([])
+            motions[-1].append(phase)
+        joined = phase.name in _MOTION and phase.name != "stroke"
+    if "follows_load" in pull.flags:
+        motions = []
+    found: list[Slip] = []
+    for motion in motions:
+        first, last = np.searchsorted(signal.time_s, (motion[0].start_s, motion[-1].end_s))
+        time, force = signal.time_s[first : last + 1], signal.force_N[first : last + 1] - pull.zero_N
+        if time.size < _FEWEST:
+            continue
+        from_rest = motion[0].name == "rise"
+        speeds = [p.speed_m_s for p in motion if p.speed_m_s > 0]
+        speed = test.speed_m_s or (float(np.median(speeds)) if speeds else math.nan)
+        slips = slips_of(
+            time, math.copysign(1.0, float(np.median(force))) * force, speed_m_s=speed, stiffness_N_per_m=stiffness,
+            loading_N_per_s=pull.rise_N_per_s, from_rest=from_rest,
+        )  # fmt: skip
+        if from_rest and slips:
+            slips = (_from_static_peak(slips[0], pull, held), *slips[1:])
+        found += slips
+    if by_hand:
+        time, force = signal.time_s, signal.force_N - pull.zero_N
+        speed = test.speed_m_s or math.nan
+        return changed_by_hand(time, force, found, by_hand, speed, stiffness)
+    return tuple(found)
+
+
+def _from_static_peak(slip: Slip, pull: Pull, hold_s: float | None) -> Slip:
+    """The first slip of a motion from rest: it fails at the static peak that the rule has read."""
+    peaks = [(pull.peak_s, pull.static_N, hold_s), *((r.peak_s, r.static_N, r.hold_s) for r in pull.restarts)]
+    peak_s, static_N, hold_s = min(peaks, key=lambda peak: abs(peak[0] - slip.fail_s))
+    hold_s = math.nan if hold_s is None else hold_s
+    if not slip.start_s < peak_s < slip.end_s or not static_N > slip.trough_N:
+        return replace(slip, hold_s=hold_s)
+    way = slip.slip_m * (static_N - slip.trough_N) / slip.drop_N
+    lasts = slip.end_s - peak_s if math.isfinite(slip.duration_s) else math.nan
+    return replace(slip, fail_s=peak_s, peak_N=static_N, slip_m=way, duration_s=lasts, hold_s=hold_s)
 
 
 def _doubts(trace: Trace, pull: Pull, test: Test, *, one_speed: bool) -> list[Problem]:

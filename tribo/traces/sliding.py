@@ -27,7 +27,7 @@ _STICKS = 0.66  # share of a cycle in which the force rises, from which on the s
 _FELT = 0.03  # share of the mean force below which a swing leaves the sliding steady
 _IRREGULAR = 1.2  # spread of the cycle times over their mean above which they are irregular
 _OF_LOADING = 0.5  # share of the loading slope above which the slider counts as stuck
-_MOST_REGAINED = 2.0  # times k v by which a force rises at the most: a slider swings back no faster than it is pulled
+MOST_REGAINED = 2.0  # times k v by which a force rises at the most: a slider swings back no faster than it is pulled
 _POSSIBLE = 0.9  # share of the cycles that the drive must be able to supply
 _MOST_TRIES, _NEXT_TRY = 12, 1.5  # falls that count are made larger by this factor until it can
 _MEDIAN_U = 1.2533  # standard uncertainty of a median over that of a mean, normal distribution
@@ -53,20 +53,10 @@ def oscillation_of(
     stick-slip, one that rises for half of it an inertial oscillation. ``drive_N_per_s`` is k v, where stiffness and
     speed are known: a slider that sticks is loaded at this rate. ``free_period_s`` is 2 pi sqrt(m/k).
     """
-    from scipy.ndimage import median_filter, uniform_filter1d
+    from scipy.ndimage import uniform_filter1d
 
-    # impulses of one or two samples are taken out by a median, which leaves slips as they are
-    calm = np.asarray(median_filter(force_N, _MEDIAN_SAMPLES, mode="nearest"), float)
-    least = _smallest_drop(calm) if smallest_drop_N is None else smallest_drop_N
-    time, force, peaks = _cycles(time_s, calm, least)
-    noise = sample_noise(calm)
-    for _ in range(_MOST_TRIES):
-        supplied = _supplied(time, force, peaks, drive_N_per_s, noise)
-        if supplied.size == 0 or supplied.mean() >= _POSSIBLE:
-            break
-        least *= _NEXT_TRY  # noise was counted
-        time, force, peaks = _cycles(time_s, calm, least)
-    supplied = _supplied(time, force, peaks, drive_N_per_s, noise)
+    calm, time, force, peaks, _ = cycles_of(time_s, force_N, smallest_drop_N, drive_N_per_s)
+    supplied = _supplied(time, force, peaks, drive_N_per_s, sample_noise(calm))
     if peaks.size <= _FEWEST_OF_REGIME:
         spread = _MAD * float(np.median(np.abs(force_N - np.median(force_N))))
         keeps_level = spread < max(5.0 * sample_noise(force_N), 0.1 * abs(float(np.median(force_N))))
@@ -94,6 +84,30 @@ def oscillation_of(
     )  # fmt: skip
 
 
+def cycles_of(
+    time_s: FloatArray, force_N: FloatArray, smallest_drop_N: float | None, drive_N_per_s: float
+) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray, float]:
+    """The turning points of a force: its calm form, time and force averaged to what a cycle needs, the indices of the
+    peaks in those, and the least fall that counted.
+
+    Where the drive cannot supply what most cycles regain, noise was counted, and larger falls are asked for.
+    """
+    from scipy.ndimage import median_filter
+
+    # impulses of one or two samples are taken out by a median, which leaves slips as they are
+    calm = np.asarray(median_filter(force_N, _MEDIAN_SAMPLES, mode="nearest"), float)
+    least = _smallest_drop(calm) if smallest_drop_N is None else smallest_drop_N
+    time, force, peaks = _cycles(time_s, calm, least)
+    noise = sample_noise(calm)
+    for _ in range(_MOST_TRIES):
+        supplied = _supplied(time, force, peaks, drive_N_per_s, noise)
+        if supplied.size == 0 or supplied.mean() >= _POSSIBLE:
+            break
+        least *= _NEXT_TRY
+        time, force, peaks = _cycles(time_s, calm, least)
+    return calm, time, force, peaks, least
+
+
 def _cycles(time_s: FloatArray, calm: FloatArray, least: float) -> tuple[FloatArray, FloatArray, np.ndarray]:
     """Time and force, averaged to as many samples as a cycle needs, and the indices of the peaks in them."""
     peaks, _ = turning_points(calm, least)
@@ -117,7 +131,7 @@ def _supplied(time: FloatArray, force: FloatArray, peaks: np.ndarray, drive_N_pe
         return np.ones(max(peaks.size - 1, 0), bool)
     troughs = _troughs(force, peaks)
     regained, spent = force[peaks[1:]] - force[troughs], time[peaks[1:]] - time[troughs]
-    return np.asarray(regained < _MOST_REGAINED * drive_N_per_s * spent + 3.0 * noise)
+    return np.asarray(regained < MOST_REGAINED * drive_N_per_s * spent + 3.0 * noise)
 
 
 def _smallest_drop(force: FloatArray) -> float:

@@ -266,7 +266,13 @@ def by_hand_sentence(decided: Override, pull: Pull | None) -> str:
         moved.append(f"sliding window from {before} s to {after} s")
     for phase in decided.phases:
         moved.append(f"{phase.name} from {significant(phase.start_s)} to {significant(phase.end_s)} s")
-    done = "Stated" if decided.phases else "Moved"
+    for number, fail, end in decided.slips:
+        between = f"from {significant(fail)} to {significant(end)} s"
+        moved.append(
+            f"slip {number} taken out" if not math.isfinite(fail)
+            else f"slip {number} moved: {between}" if number else f"a slip added {between}"
+        )  # fmt: skip
+    done = "Changed" if decided.slips else "Stated" if decided.phases else "Moved"
     return (
         f"{done} by hand{reason}: {joined(moved)}. Static force {_changed(automatic.static_N, pull.static_N)}, "
         f"sliding force {_changed(automatic.sliding_N, pull.sliding_N)}."
@@ -292,10 +298,7 @@ def bent_laws(study: Study) -> Iterator[str]:
     if bent:
         intercept = "τ₀" if study.ingested.campaign.has_area else "T₀"
         named = joined([f"{fit.sample} {fit.regime} (χ²/ν = {significant(fit.chi2_red, 2)})" for fit in bent])
-        yield (
-            f"T against N is not a straight line for {named}: μ and {intercept} there depend on the range of "
-            "loads."
-        )
+        yield (f"T against N is not a straight line for {named}: μ and {intercept} there depend on the range of loads.")
 
 
 def friction_sentence(study: Study) -> str:
@@ -305,9 +308,7 @@ def friction_sentence(study: Study) -> str:
         if off:
             worst = max((load for a in off for load in a.loads), key=lambda load: abs(load.deviation))
             a = next(a for a in off if worst in a.loads)
-            value, low, high = (
-                f"{100 * (x - 1):+.0f}".replace("-", "−") for x in (worst.ratio, worst.low, worst.high)
-            )
+            value, low, high = (f"{100 * (x - 1):+.0f}".replace("-", "−") for x in (worst.ratio, worst.low, worst.high))
             return (
                 f"Measured friction differs most from the model for {a.regime} friction of {a.sample} at "
                 f"{significant(worst.normal_load_N)} N, by {value} % (95 % interval {low} to {high} %); no diagnosis "

@@ -315,6 +315,12 @@
       const px = s.x(time);
       svg.append(make("path", { class: "doubt", d: `M${px - 5} ${s.top}h10l-5 9z` }, make("title", {}, `${number(time)} s: ${what}`)));
     }
+    for (const [fail, peak, end, trough] of current.record.slips || []) {
+      if (end < view[0] || fail > view[1]) continue;
+      const slip = make("line", { class: "slip", x1: inView(fail), y1: s.y(peak), x2: inView(end), y2: s.y(trough) });
+      slip.append(make("title", {}, `slip at ${number(fail)} s, drop ${number(peak - trough)} N`));
+      svg.append(slip);
+    }
     for (const [k, [name, start, end]] of (current.record.phases || []).entries()) {
       if (end <= view[0] || start >= view[1]) continue;
       const left = inView(start), width = Math.max(inView(end) - left, 1);
@@ -416,6 +422,12 @@
       return [id, d.action, d.reason.trim().replace(/\s+/g, " "), ...window, moved && d.peak !== null ? d.peak : ""];
     });
     const head = ["test_id", "action", "reason", "window_start_s", "window_end_s", "peak_s"];
+    const ofSlips = Object.entries(traces).filter(([id, r]) => r.slips_by_hand && decisions.get(id)?.action !== "exclude");
+    if (ofSlips.length) {
+      head.push("event", "fail_s", "end_s");
+      rows.forEach((row) => row.push("", "", ""));
+      for (const [id, r] of ofSlips) for (const [n, why, fail, end] of r.slips_by_hand) rows.push([id, "event", why, "", "", "", n, fail, end]);
+    }
     const text = [head, ...rows].map((row) => row.map((v) => cell(String(v))).join(",")).join("\n") + "\n";
     const url = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
     make("a", { href: url, download: "overrides.csv" }).click();
