@@ -100,7 +100,11 @@ def small_report(small_campaign: Path, once: Once) -> Path:
     return once("small_report", report) / "out"
 
 
-LONG_FILES = ("pipeline", "test_spoiled_campaigns", "faults", "blind", "cli", "springblock", "diagnose")
+# The first compiles the engine; the second simulates nothing, so that only one process compiles.
+LONG_FILES = (
+    "design", "blind", "pipeline", "diagnose", "test_spoiled_campaigns", "faults", "test_docs", "cli", "springblock",
+    "mistakes", "laboratories",
+)  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ def specimen_drift(b: Bench, rng: np.random.Generator) -> np.ndarray:
     return of_one_size(run.to_numpy() * b.tests["specimen"].map(rates).to_numpy())
 
 
+@cache
 def diagnosed(seed: int, course: Course | None, effects: tuple[tuple[str, float], ...] = ()) -> Diagnosis:
     b = hide(seed, list(effects), Design(repeats=2))
     if course is not None:
