@@ -20,7 +20,7 @@ from tribo.diagnostics import (
 from tribo.diagnostics.candidates import CauseCandidate, weigh
 from tribo.diagnostics.model import PATTERN, Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
-from tribo.diagnostics.planning import Finding, Plan, first_test_of, next_test
+from tribo.diagnostics.planning import Finding, Plan, first_test_of, next_test, settling_test
 from tribo.diagnostics.scatter import first_noise
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.errors import FitError
@@ -207,6 +207,24 @@ def test_the_predicted_change_of_a_confirming_test_is_that_of_the_formula(faster
     low, _, high = test.design["values"]
     by_formula = (1 + a * np.log(high / 2e-4)) / (1 + a * np.log(low / 2e-4))
     assert test.design["expected_percent"] == pytest.approx(100 * (by_formula - 1), rel=1e-3)
+
+
+def test_a_cause_whose_column_cannot_be_set_is_tested_by_itself(examined: Diagnosis) -> None:
+    """Run-in without a rival: fresh specimens, pulled as often; nothing is parted from what was already ruled out."""
+    assert [c.mechanism for c in examined.verdict.causes] == ["run_in"]
+    said = worded(examined.verdict).next_test
+    assert said is not None
+    assert (said.kind, said.design["covariate"]) == ("vary one column", "specimen_run")
+    assert said.text.startswith("Pull fresh specimens of one sample at one load")
+
+
+def test_a_load_error_without_a_rival_is_measured_and_suction_is_removed() -> None:
+    both = ranked(campaign())
+    weighed, vented = (settling_test(both[name]) for name in ("normal_load_error", "suction"))
+    assert weighed is not None
+    assert vented is not None
+    assert (weighed.kind, weighed.separates) == ("measure", ("normal_load_error",))
+    assert (vented.kind, vented.design["without"]) == ("remove", "suction")
 
 
 def test_two_columns_that_act_together_are_varied_each_with_each() -> None:

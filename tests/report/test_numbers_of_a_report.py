@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from report.recomputed import Written, unchecked
+from report.recomputed import Page, Written, unchecked
 from tribo.campaign import open_campaign
 from tribo.cli import main
 from tribo.files import data_dir
@@ -49,6 +50,26 @@ def test_a_percentage_or_a_count_that_is_off_by_one_is_noticed(
     unchecked(w)
     assert "used: printed 25, recomputed 24" in w.wrong
     assert len(w.wrong) > 2
+
+
+# wordings that a tribologist had to read twice, each with what stands for it now
+RIDDLES = {
+    r"less one": "difference from the model",
+    r"100 \(measured / model . 1\) against": "difference of measured from modelled friction",
+    r"\+-": "±",
+    r"does as well in": "a law is as good in ... of the cases",
+    r"A law was found": "the law itself",
+    r"beyond the 95 % interval in \d": "the number of loads",
+    r"times the error that is stated for it": "times its stated error",
+    r"except at \d+ of": "at how many it agrees",
+    r"(?<![\w.e])-\d+ %": "−, the sign of a number",
+}
+
+
+def test_no_sentence_of_a_report_is_a_riddle(small_report: Path) -> None:
+    texts = [text for _, text in Page(small_report / "report.html").texts]
+    assert len(texts) > 100
+    assert {said: text for said in RIDDLES for text in texts if re.search(said, text)} == {}
 
 
 @pytest.mark.slow

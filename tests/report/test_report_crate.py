@@ -57,3 +57,12 @@ def test_what_was_not_recorded_is_said_to_be_so(study: Study) -> None:
     unsaid = ("Temperature", "Hold time before the pull", "Operator", "Counterface, material", "Lubrication")
     for name in unsaid:
         assert found[name].in_words == "not recorded"
+
+
+def test_a_specimen_pulled_in_two_directions_counts_once(study: Study) -> None:
+    """The same campaign, with the specimens of Sx pulled along y as well in place of three of their own."""
+    campaign = study.ingested.campaign
+    both = tuple(replace(t, specimen=t.specimen.replace("Sy", "Sx")) for t in campaign.tests)
+    turned = replace(study, ingested=replace(study.ingested, campaign=replace(campaign, tests=both)))
+    before, after = (next(c.value for c in conditions(s) if c.name == "Specimens") for s in (study, turned))
+    assert (before, after) == ("18 specimens", "15 specimens")

@@ -48,11 +48,19 @@ def test_loads_off_on_both_sides_are_mixed() -> None:
     assert "too high at some loads and too low at others for C" in wording.in_short([agreement], "F")[0]
 
 
+def test_an_inconclusive_load_is_not_counted_as_agreement() -> None:
+    """Two loads agree, one is too wide to tell, one is too low: the model agrees at two of four."""
+    loads = (ratio(1.0, 0.9, 1.1, 1), ratio(1.0, 0.9, 1.1, 2), ratio(1.1, 0.5, 2.4, 3), ratio(1.3, 1.2, 1.4, 4))
+    agreement = Agreement("A", "static", loads, False)
+    said = wording.in_short([agreement], "F")[0]
+    assert "agrees with the measurement for A (at 2 of 4 loads; inconclusive at 1)" in said
+
+
 def test_one_load_of_six_outside_is_agreement_with_an_exception() -> None:
     loads = (*(ratio(1.0, 0.9, 1.1, k) for k in range(5)), ratio(0.8, 0.7, 0.9, 6))
     agreement = Agreement("B", "static", loads, False)
     assert agreement.verdict == "agrees"
-    assert "agrees with the measurement for B (except at 1 of 6 loads)" in wording.in_short([agreement], "F")[0]
+    assert "agrees with the measurement for B (at 5 of 6 loads)" in wording.in_short([agreement], "F")[0]
 
 
 def test_wide_intervals_are_inconclusive() -> None:

@@ -12,7 +12,7 @@ import pytest
 from tribo.errors import Problem
 from tribo.figures.one_pull import pull_numbers
 from tribo.records import Override, Phase, Study
-from tribo.report.pulls import trace_data, trace_picture
+from tribo.report.pulls import peak_above_samples, trace_data, trace_picture
 from tribo.report.shell import script_json
 from tribo.report.tables import phases_table
 
@@ -43,6 +43,17 @@ def test_a_long_trace_is_thinned_without_losing_its_extremes(study: Study) -> No
     assert len(values) <= 1002
     assert record["whole"] is False
     assert values.max() == pytest.approx(9.0 - study.ingested.pulls["T0001"].zero_N, abs=1e-3)
+
+
+def test_a_peak_above_every_sample_is_said_to_be_interpolated(study: Study) -> None:
+    trace, pull = study.ingested.traces["T0001"], study.ingested.pulls["T0001"]
+    before = (trace.force_N - pull.zero_N)[trace.time_s < pull.window_s[0]]
+    above, among = (replace(pull, static_N=factor * float(before.max())) for factor in (1.08, 1.0))
+    assert peak_above_samples(trace, above) == (
+        "the peak is interpolated between samples, 8 % above the highest of them"
+    )
+    assert peak_above_samples(trace, among) == ""
+    assert peak_above_samples(trace, replace(pull, static_N=np.nan)) == ""
 
 
 def test_every_doubt_about_a_sample_is_shown_at_its_time(study: Study) -> None:

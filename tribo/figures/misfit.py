@@ -324,8 +324,8 @@ MISFIT = style.FigureOf(
     "misfit",
     "Where the calibrated model fails",
     "Change of measured over modelled friction, in percent, from the low to the high end of each recorded "
-    "variable (5 to 95 % of its range), for each sample. Column “mean”: geometric mean over the sample of "
-    "measured over modelled friction, less one. Column “bend with load”: height of the ends of the load range above "
+    "variable (5 to 95 % of its range), for each sample. Column “mean”: difference of the sample from the model, as a "
+    "geometric mean. Column “bend with load”: height of the ends of the load range above "
     "its middle. Strong colours and asterisks (** p < 0.01, * p < 0.05) mark statistically significant deviations. "
     "The p values "
     "are adjusted for all comparisons: each is compared with the strongest deviation in simulated campaigns "

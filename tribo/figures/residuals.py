@@ -410,7 +410,7 @@ def _finding_legend(numbers: pd.DataFrame) -> list[Any]:
 FINDING = style.FigureOf(
     "finding",
     "What was found",
-    "Measured over modelled friction, less one, in percent, against the quantity that it follows. The model is "
+    "Difference of measured from modelled friction, in percent, against the quantity that it follows. The model is "
     "calibrated on the flat sample. Points "
     "with bars: geometric means with twice their standard error. Band: range of 95 % of such means if the model were "
     "right. Thick line, if a cause is named: what it adds. Small points, if shown: tests.",
@@ -420,11 +420,11 @@ FINDING = style.FigureOf(
 RESIDUALS = style.FigureOf(
     "residuals",
     "The strongest deviations",
-    "100 (measured / model − 1) against the recorded variable with which it varies most strongly; if no "
-    "deviation is significant, against the three variables that come closest. Small points: tests; points with "
-    "bars: geometric means with twice their standard error. Band: range of 95 % of such means if the model were right, "
-    "given the scatter of repeats and specimens and the error of the model: the stated one for the means of the "
-    "samples, else that which the samples of this campaign show. Thick line: contribution of the "
+    "Difference of measured from modelled friction, in percent, against the recorded variable with which it varies "
+    "most strongly; if no deviation is significant, against the three variables that come closest. Small points: "
+    "tests; points with bars: geometric means with twice their standard error. Band: range of 95 % of such means if "
+    "the model were right, given the scatter of repeats and specimens and the error of the model: the stated one for "
+    "the means of the samples, else that which the samples of this campaign show. Thick line: contribution of the "
     "identified mechanism.",
     residual_numbers,
     draw_residuals,

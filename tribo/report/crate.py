@@ -20,6 +20,7 @@ from tribo.comparison import study_lookup
 from tribo.records import PA_PER_KPA, Campaign, Pattern, Study, Test
 from tribo.report.provenance import Provenance, file_hash
 from tribo.wording.numerals import counted, joined, significant
+from tribo.wording.study_sentences import specimens_of
 
 ONTOLOGY = "https://raw.githubusercontent.com/nick-garabedian/TriboDataFAIR-Ontology/v0.1.1/TriboDataFAIR_Ontology.owl#"
 NOT_RECORDED = "not recorded"
@@ -57,7 +58,7 @@ def _bodies(study: Study, tests: list[Test]) -> Iterator[Condition]:
     yield Condition("Counterface, material", campaign.counterface or NOT_RECORDED, term="MaterialName")
     yield Condition("Surface geometry", "; ".join(f"{s}: {_geometry(campaign.samples[s])}" for s in samples))
     yield Condition("Surface roughness and preparation", NOT_RECORDED)
-    specimens = len({(t.sample, t.specimen) for t in tests})
+    specimens = len(specimens_of(campaign, tests))
     yield Condition("Specimens", counted(specimens, "specimen"), term="BlockSpecimen")
 
 

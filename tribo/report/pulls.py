@@ -16,12 +16,13 @@ from tribo.comparison.study_lookup import ODD_SCORE, standings
 from tribo.figures.one_pull import thin_trace
 from tribo.records import FloatArray, Override, Pull, Study, Test, Trace
 from tribo.report.shell import script_json
-from tribo.wording.numerals import significant, with_uncertainty
+from tribo.wording.numerals import percent, significant, with_uncertainty
 from tribo.wording.study_sentences import by_hand_sentence, flags_in_words, odd_sentence
 
 WIDTH, HEIGHT = 180, 56
 PICTURE_BYTES = 1_200_000  # all pictures together, so that the page stays easy to send
 PULLS_A_PAGE = 2000  # more of them on one page are slow to open
+LEAST_ABOVE = 1.01  # of the highest sample, from which on a peak above it is said
 BY_HAND = ("peak_by_hand", "phases_by_hand", "window_by_hand")
 
 
@@ -95,6 +96,7 @@ def _card(study: Study, test: Test, load: str, standing: Mapping[str, Any] | Non
         "sliding": with_uncertainty(pull.sliding_N, pull.sliding_u_N),
         "zero": significant(pull.zero_N, 2),
         "window": f"{significant(start)} to {significant(end)}",
+        "above_samples": peak_above_samples(trace, pull),
         "flags": flags,
         "flags_in_words": flags_in_words(flags),
         "odd": odd_sentence(standing) if standing is not None and score > ODD_SCORE else "",
@@ -103,6 +105,16 @@ def _card(study: Study, test: Test, load: str, standing: Mapping[str, Any] | Non
         "order": test.run_order or 0,
         "picture": trace_picture(trace, pull, points),
     }
+
+
+def peak_above_samples(trace: Trace, pull: Pull) -> str:
+    """By how much an interpolated static peak lies above every sample before the sliding window; empty below 1 %."""
+    start = pull.window_s[0] if math.isfinite(pull.window_s[0]) else math.inf
+    before = (trace.force_N - pull.zero_N)[(trace.time_s < start) & np.isfinite(trace.force_N)]
+    if not len(before) or not pull.static_N > LEAST_ABOVE * before.max() > 0.0:
+        return ""
+    above = percent(pull.static_N / float(before.max()) - 1)
+    return f"the peak is interpolated between samples, {above} above the highest of them"
 
 
 def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:

@@ -113,7 +113,7 @@ def write_demo_page(out: Path) -> Path:
                 "folder": folder,
                 "card": json.loads(text_of(out / folder / "card.json")),
                 "verdict": json.loads(text_of(out / folder / "verdict.json")),
-                "figure": Markup(inline_svg(figure, name, "measured over modelled friction, less one, in percent")),
+                "figure": Markup(inline_svg(figure, name, "difference of measured from modelled friction, in percent")),
             }
         )
     templates = environment()

@@ -208,11 +208,9 @@ def across_sentence(found: Sequence[LawsAcross]) -> str:
         )
     best = min(found, key=lambda s: s.best.error)
     return (
-        f"No law across the patterns is beyond chance. The best one, {formula(best.best)}, predicts "
-        f"patterns that it was not fitted to within {_factor(best.best.error)}; the model alone, within "
-        f"{_factor(without)}. Where the differences are exchanged between the patterns at random, the best law is as "
-        f"good in {100 * best.p:.0f} % of the cases. Chosen without the pattern that it predicts, it is wrong by "
-        f"{_factor(best.nested)}. {_tried(best)}"
+        "No law across the patterns is beyond chance: with the differences exchanged between the patterns at random, a "
+        f"law is as good in {100 * best.p:.0f} % of the cases. Chosen and fitted without the pattern that it predicts, "
+        f"the best law is wrong by {_factor(best.nested)}, the model alone by {_factor(without)}. {_tried(best)}"
     )
 
 

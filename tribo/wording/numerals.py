@@ -73,6 +73,11 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
+def signed(value: float) -> str:
+    """ "−57", "+8": a percentage in whole numbers with its sign; a dash where there is none."""
+    return f"{value:+.0f}".replace("-", "−") if math.isfinite(value) else "–"
+
+
 def _signed(text: str) -> str:
     return text.replace("-", "−")
 

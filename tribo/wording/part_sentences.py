@@ -19,7 +19,7 @@ from tribo.mechanisms import MECHANISMS, mechanism
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.vocabulary import COLUMNS, OBSERVABLES, ColumnWords, in_words
 from tribo.wording.law_sentences import each_value, law_sentence, law_test, size_sentence, tied_laws
-from tribo.wording.numerals import counted, joined, p_text, sentence_case
+from tribo.wording.numerals import counted, joined, p_text, sentence_case, signed, with_uncertainty
 
 BETWEEN = {
     "mean": "mean", "bend": "the ends above the middle", "ends": "from the low to the high end",
@@ -96,7 +96,8 @@ def misfit_sentence(m: Misfit) -> str:
     shows = m.shows
     if isinstance(shows, Effect):
         of = f" of {m.sample}" if m.sample and shows.contrast.kind != "specimen" else ""
-        size = f"{m.effect_percent:+.0f} % (90 % interval {m.low:+.0f} to {m.high:+.0f} %), {BETWEEN[shows.between]}"
+        interval = f"90 % interval {signed(m.low)} to {signed(m.high)} %"
+        size = f"{signed(m.effect_percent)} % ({interval}), {BETWEEN[shows.between]}"
         what = f"{sentence_case(OBSERVABLES[m.observable])}{of} {_seen(shows)}"
         return f"{what}: {size} (adjusted p {p_text(m.p_adjusted)})."
     if isinstance(shows, OverLoads):
@@ -161,7 +162,7 @@ def cause_sentence(c: Cause) -> str:
     if c.changes is None:
         return f"{name}. {signs_of(m)}"
     low, high = c.changes
-    said = f"{name}: {size}. With it, the calibrated model changes by {low:+.0f} to {high:+.0f} %. {signs_of(m)}"
+    said = f"{name}: {size}. It changes the calibrated model by {signed(low)} to {signed(high)} %. {signs_of(m)}"
     return f"{said} {m.choosing.remedy(c.choice)}".rstrip() if c.choice else said
 
 
@@ -170,8 +171,8 @@ def layer_sentence(layer: Layer) -> str:
     shows, value, low, high = layer.shows, layer.effect_percent, layer.low, layer.high
     if layer.kind == "pattern_correction":
         return (
-            f"{sentence_case(layer.regimes[0])} friction of {layer.name}: measured over modelled T, less one, is "
-            f"{value:+.0f} % (geometric mean over its tests; 90 % interval {low:+.0f} to {high:+.0f} %; adjusted p "
+            f"{sentence_case(layer.regimes[0])} friction of {layer.name} differs from the model by {signed(value)} % "
+            f"(geometric mean over its tests; 90 % interval {signed(low)} to {signed(high)} %; adjusted p "
             f"{p_text(layer.p_adjusted)})."
         )
     if layer.kind == "baseline":
@@ -198,8 +199,8 @@ def layer_sentence(layer: Layer) -> str:
         said = f"{sentence_case(mechanism(layer.name).in_words)} changes T by {change_over_range(layer.over)}."
         return f"{said} {tied_laws(shows)}" if tied else said
     said = (
-        f"{sentence_case(mechanism(layer.name).in_words)} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
-        f"{high:+.0f} %) where it acts most: {place(layer)}."
+        f"{sentence_case(mechanism(layer.name).in_words)} changes T by {signed(value)} % (90 % interval {signed(low)} "
+        f"to {signed(high)} %) where it acts most: {place(layer)}."
     )
     return f"{said} {tied_laws(shows)}" if tied else said
 
@@ -208,7 +209,7 @@ def change_over_range(over: Mapping[str, Any]) -> str:
     """ "+25 % (90 % interval +22 to +29 %) as the pull speed rises from 0.05 to 0.8 mm/s"."""
     words = COLUMNS.get(over["column"], ColumnWords(over["column"]))
     start, end = (f"{words.factor * over[key]:.3g}" for key in ("from", "to"))
-    sizes = [f"{over[key]:+.0f}".replace("-", "−") for key in ("percent", "low", "high")]
+    sizes = [signed(over[key]) for key in ("percent", "low", "high")]
     return (
         f"{sizes[0]} % (90 % interval {sizes[1]} to {sizes[2]} %) as {words.words} rises from {start} to "
         f"{end} {words.unit}".rstrip()
@@ -269,7 +270,7 @@ def _follows(f: ColumnEffect) -> str:
 
 
 def _running_in(records: Sequence[RunningIn]) -> str:
-    sizes = [f"{r.first_percent:+.0f} %".replace("-", "−") for r in records]
+    sizes = [f"{signed(r.first_percent)} %" for r in records]
     shown = [f"{r.test_id} ({r.sample}) {size}" for r, size in zip(records[:MOST_RECORDS], sizes, strict=False)]
     more = f" and {len(records) - MOST_RECORDS} more" if len(records) > MOST_RECORDS else ""
     share = 100.0 * records[0].distance_m / records[0].whole_m
@@ -322,7 +323,8 @@ def why_not(e: Excluded) -> str:
     if e.why == "zero subtracted" and isinstance(e.shows, Evidence) and m.evidence is not None:
         changes = "changes by" if m.evidence.quantity == "zero drift" else "is"
         return (
-            f"the force before contact {changes} {e.shows.value:.2g} +- {e.shows.standard_error:.1g} {e.shows.unit}; "
+            f"the force before contact {changes} {with_uncertainty(e.shows.value, e.shows.standard_error)} "
+            f"{e.shows.unit}; "
             "the zero of each pull was subtracted, so it cannot explain the friction forces"
         )
     if e.why == "not certain" and isinstance(e.shows, Evidence) and m.evidence is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 FLAGS = {
     "follows_load": "follows the normal load", "gap_at_peak": "gap in the data at the peak",
-    "impulsive": "impulsive noise", "no_drop": "no drop after the peak", "no_sliding": "no sliding phase",
+    "impulsive": "impulsive noise", "no_drop": "no certain drop after the peak", "no_sliding": "no sliding phase",
     "no_static": "no static peak", "no_zero_phase": "no zero phase", "peak_ambiguous": "readings of the peak differ",
     "peak_between_samples": "peak between samples", "peak_by_hand": "peak moved by hand", "restarts": "restarts",
     "phases_by_hand": "phases stated by hand",
@@ -30,7 +30,7 @@ FLAGS = {
 SIDE: dict[Verdict, str] = {"model too high": "too high", "model too low": "too low"}
 HOW_TO_READ = (
     "The ratio is the measured friction force divided by the simulated one, with its 95 % interval. Percentages are "
-    "this ratio less one: −20 % means that the measured force is 20 % below the simulated one. The interval contains "
+    "its difference from 1: −20 % means that the measured force is 20 % below the simulated one. The interval contains "
     "the scatter of specimens and repeats and the error of the calibration; an error of the load cell's gain changes "
     "the measurement and the calibrated model alike, so it is not in the interval. The model "
     "agrees at a load if the interval contains 1 and its limits are within a factor of 1.2 of the ratio. If the "
@@ -132,9 +132,12 @@ def deviation(fraction: float) -> str:
 
 
 def _inside(agreement: Agreement) -> str:
-    if not agreement.n_outside:
+    """The sample; where it does not agree at all loads, at how many it does, and at how many nothing can be said."""
+    inside, unclear, n = agreement.count("agrees"), agreement.count("inconclusive"), len(agreement.loads)
+    if inside == n:
         return agreement.sample
-    return f"{agreement.sample} (except at {_at(agreement.n_outside, len(agreement.loads))})"
+    open_yet = f"; inconclusive at {unclear}" if unclear else ""
+    return f"{agreement.sample} (at {_at(inside, n)}{open_yet})"
 
 
 def _off_by(agreement: Agreement) -> str:

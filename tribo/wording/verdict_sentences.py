@@ -30,7 +30,15 @@ from tribo.diagnostics.without_model import ColumnsTested
 from tribo.mechanisms.record import TraceEvidence
 from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words, short_label
 from tribo.wording.law_sentences import across_sentence, held_sentence, tied_laws
-from tribo.wording.numerals import counted, joined, p_text, sentence_case, significant
+from tribo.wording.numerals import (
+    counted,
+    joined,
+    p_text,
+    sentence_case,
+    signed,
+    significant,
+    with_uncertainty,
+)
 from tribo.wording.part_sentences import (
     cause_sentence,
     change_over_range,
@@ -243,14 +251,9 @@ def size_in_words(effect: Layer | Misfit) -> str:
     mm/s"."""
     if isinstance(effect, Layer) and effect.over:
         return change_over_range(effect.over)
-    value, low, high = (_signed(x) for x in (effect.effect_percent, effect.low, effect.high))
+    value, low, high = (signed(x) for x in (effect.effect_percent, effect.low, effect.high))
     known = math.isfinite(effect.low) and math.isfinite(effect.high)
     return f"{value} %" + (f" (90 % interval {low} to {high} %)" if known else "")
-
-
-def _signed(value: float) -> str:
-    """A percentage in whole numbers with its sign."""
-    return f"{value:+.0f}".replace("-", "−") if math.isfinite(value) else "–"
 
 
 # ------------------------------------------------------------------------------------- what the finding rests on
@@ -272,7 +275,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
             )
     elif v.verdict == "named":
         these = "this mechanism" if len(v.causes) == 1 else "these mechanisms"
-        yield f"With {these} included, the remaining differences are within chance."
+        yield f"With {these} included, the remaining differences are within chance{_and_error(v)}."
     elif v.verdict == "partly" and not laws:
         yield f"A misfit remains beyond chance: {v.misfits[0].text if v.misfits else 'no single column explains it.'}"
     elif v.verdict == "unknown" and (apart := _patterns_apart(v)):
@@ -305,11 +308,17 @@ def _evidence(v: Verdict) -> Iterator[str]:
             yield law.text
         yield tied_laws(getattr(law.shows, "ties", ()), by_values=bool(law.levels))
     if shows.within_chance is not None and v.verdict not in ("no_misfit", "named"):
-        within = "With this included, the remaining differences are within chance."
+        within = f"With this included, the remaining differences are within chance{_and_error(v)}."
         yield within if shows.within_chance else "A misfit remains."
     if shows.across:
         yield across_sentence(shows.across)
     yield from _simulation(v.model)
+
+
+def _and_error(v: Verdict) -> str:
+    """What differences are also compared with, where samples were predicted."""
+    patterned = any(layer.kind == "pattern_correction" for layer in v.layers)
+    return " and the error that the model has for the patterns" if patterned else ""
 
 
 def _patterns_apart(v: Verdict) -> list[str]:
@@ -328,10 +337,10 @@ def _simulation(model: Any) -> Iterator[str]:
     if found := model.get("simulated"):
         yield (
             f"With {_all(found['mechanisms'])} in the simulator itself ({found['pairs_of_runs']} pairs of runs), the "
-            f"effect is {found['effect_over_law']:.3f} +- {found['effect_over_law_u']:.3f} times that of its law. The "
-            "root mean square of measured over modelled T, less one, is "
-            f"{found['rms_percent_before']:.1f} % for the calibrated model, {found['rms_percent_simulated']:.1f} % "
-            f"with the simulated effect and {found['rms_percent_law']:.1f} % with the law."
+            f"effect is {with_uncertainty(found['effect_over_law'], found['effect_over_law_u'])} times that of its "
+            f"formula. The tests differ from the calibrated model by {found['rms_percent_before']:.1f} %, from the "
+            f"model with the simulated effect by {found['rms_percent_simulated']:.1f} % and with the formula by "
+            f"{found['rms_percent_law']:.1f} % (root mean squares)."
         )
 
 
@@ -450,9 +459,11 @@ def why_next(v: Verdict) -> str:
         design = v.next_test.design
         words = COLUMNS[str(design["covariate"])]
         low, *_, high = (value * words.factor for value in design["values"])
-        change = f"{design['expected_percent']:+.0f} %".replace("-", "−")
+        change = f"{signed(design['expected_percent'])} %"
         over = f"{design['regime']} friction from {low:.3g} to {high:.3g} {words.unit}"
         return f"{name_in_words(separates[0])} predicts {change} in {over}"
+    if v.next_test is not None and len(separates) == 1 and v.next_test.kind in ("measure", "remove"):
+        return f"it settles whether {name_in_words(separates[0])} is the cause"
     alone = v.next_test is not None and v.next_test.kind in ("vary one column", "factorial")
     if alone or (v.verdict == "unknown" and not of_kind(v, "law")):
         return f"to see whether friction follows {joined(list(map(in_words, separates)))} when nothing else changes"
@@ -503,7 +514,7 @@ def _law(layer: Layer) -> dict[str, str]:
 
 def _correction(layer: Layer) -> tuple[str, str, str, str]:
     """Sample, regime, mean of measured over modelled T less one with its interval, and the adjusted p value."""
-    value, low, high = map(_signed, (layer.effect_percent, layer.low, layer.high))
+    value, low, high = map(signed, (layer.effect_percent, layer.low, layer.high))
     return layer.name, layer.regimes[0], f"{value} % ({low} to {high} %)", p_text(layer.p_adjusted)
 
 
