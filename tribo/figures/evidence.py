@@ -122,8 +122,12 @@ def _frame(ax: Axes, rows: pd.DataFrame, reach: float) -> None:
     ax.set_xlim(LEAST_SHOWN, reach)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
-    narrow = style.page_mm() < style.PAGE_MM
-    ax.set_xlabel(f"Increase in log likelihood over the{chr(10) if narrow else ' '}calibrated model, after penalty")
+    ax.set_xlabel(f"Increase in log likelihood over the{_break()}calibrated model, after penalty")
+
+
+def _break() -> str:
+    """Between two parts of a label: a new line on a page too narrow for both."""
+    return "\n" if style.page_mm() < style.PAGE_MM else " "
 
 
 def _short(reason: str, most: int) -> str:
@@ -220,8 +224,9 @@ def _chance(ax: Axes, numbers: pd.DataFrame) -> None:
         ax.hist(chance, bins=edges.tolist(), color="0.75")
     ax.axvline(need, color="black", ls="--", lw=0.9)
     ax.axvline(observed, color=style.VERMILLION, lw=1.6)
-    style.panel_title(ax, "A misfit?", str(numbers.loc[numbers["mark"] == "answer", "name"].iloc[0]))
-    ax.set_xlabel("Strongest deviation (standard deviations)")
+    said = numbers.loc[numbers["mark"] == "answer", "name"].astype(str).tolist()  # none in tables of earlier versions
+    style.panel_title(ax, "A misfit?", said[0] if said else "yes" if observed > need else "no")
+    ax.set_xlabel(f"Strongest deviation{_break()}(standard deviations)")
     ax.set_ylabel("Campaigns")
 
 
@@ -236,11 +241,12 @@ def _sizes(ax: Axes, rows: pd.DataFrame) -> None:
         style.panel_title(ax, "Detectable effects", "none that this design can test")
         return
     ax.set_xscale("log")
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if style.page_mm() < style.PAGE_MM else (1.0, 2.0, 5.0)))
     ax.xaxis.set_minor_locator(NullLocator())
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     style.panel_title(ax, "Detectable effects")
-    ax.set_xlabel("Change of T over the range of the variable (%)")
+    narrow = style.page_mm() < style.PAGE_MM
+    ax.set_xlabel("Change of T (%)" if narrow else "Change of T over the range of the variable (%)")
 
 
 EVIDENCE = style.FigureOf(

@@ -113,7 +113,7 @@ ALL = "all samples"
 REGIMES = {"both": (0.5, 0.5), "static": (1.0, 0.0), "sliding": (0.0, 1.0), "drop": (1.0, -1.0)}
 PATTERNS = {**REGIMES, "both": (1.0, 1.0)}  # what a contrast would follow in the two regimes
 TITLES = {
-    "both": "Static and sliding friction together", "static": "Static friction", "sliding": "Sliding friction",
+    "both": "Static and sliding together", "static": "Static friction", "sliding": "Sliding friction",
     "drop": "Drop from static to sliding", "trace": "Other features of the traces",
 }  # fmt: skip
 MARKS = ((0.01, "**"), (0.05, "*"))  # adjusted p below which a cell is marked

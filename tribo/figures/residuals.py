@@ -214,7 +214,9 @@ def _p(p: float) -> str:
 def draw_residuals(numbers: pd.DataFrame) -> Figure:
     """Grey band: 95 % of the means if nothing were hidden. Bars: mean of a bin with twice its standard error."""
     groups = [part for _, part in numbers.groupby("panel")]
-    figure, axes = style.panel_grid(len(groups), 56, columns=min(len(groups), 3))
+    narrow = style.page_mm() < style.PAGE_MM
+    columns, height_mm = (1, 50.0) if narrow else (min(len(groups), 3), 56.0)
+    figure, axes = style.panel_grid(len(groups), height_mm, columns=columns)
     for ax, part in zip(axes, groups, strict=True):
         _residual_panel(ax, part)
     style.legend_below(figure, _residual_legend(numbers), columns=12)
@@ -285,6 +287,7 @@ FINDING_COLUMNS = ["regime", "axis", "mark", "sample", "test_id", "x", "x_name",
 BY_SAMPLE = ("area_fraction", "rim_per_m", "elongation", "clip_N", "sample", "tau0")
 RECORDED = {"speed_m_s": "speed_mm_s", "elapsed_s": "started_at"}
 WIDTH_MM, HEIGHT_MM = 130.0, 66.0
+LETTERS_ACROSS = 20  # of names below a panel, above which they are turned
 
 
 def finding_numbers(d: Diagnosis) -> pd.DataFrame:
@@ -387,7 +390,7 @@ def _finding_axis(ax: Axes, part: pd.DataFrame, named: bool) -> None:
     if named:
         names = tests.drop_duplicates("x").sort_values("x")
         ax.set_xticks(names["x"], names["x_name"])
-        if names["x_name"].str.len().sum() > 20:
+        if names["x_name"].str.len().sum() > LETTERS_ACROSS * min(style.page_mm() / WIDTH_MM, 1.0):
             for label in ax.get_xticklabels():
                 label.set(rotation=90, fontsize=6)
         ax.set_xlim(-0.6, float(names["x"].max()) + 0.6)
