@@ -187,7 +187,7 @@ class Laboratory:
     def _as_named(self, design: Mapping[str, Any]) -> tuple[float, float]:
         """What a look at the specimens gives: the size of the hidden effect in the parameter of the library, fitted to
         forces without scatter, since the generator has another parameter; nothing where something else is hidden."""
-        from tribo.mechanisms.table import MECHANISMS
+        from tribo.mechanisms import MECHANISMS
 
         name = str(design["measure"]).partition(":")[0]
         spread = float(design["uncertainty"])
@@ -325,7 +325,7 @@ def law_columns(v: Verdict) -> set[str]:
 def speaks(v: Verdict, test: NextTest) -> bool:
     """Whether a test is about what the headline is about: its cause, its column, its sample, or what it says that the
     design could not test."""
-    from tribo.mechanisms.table import MECHANISMS
+    from tribo.mechanisms import MECHANISMS
 
     design, separates = test.design, set(test.separates)
     about = set(design.get("vary", ())) | ({str(design["covariate"])} if "covariate" in design else set())
