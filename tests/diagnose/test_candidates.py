@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,6 +26,7 @@ from tribo.diagnostics.candidates import (
     weights_of,
 )
 from tribo.diagnostics.contrasts import FEWEST, Screen, _strongest as strongest, decided, deviate
+from tribo.diagnostics.diagnosis import Diagnosis
 from tribo.diagnostics.model import Acting, Setup
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.mechanisms import MECHANISMS
@@ -347,9 +349,15 @@ def test_a_mechanism_whose_own_column_is_still_wrong_is_left_out_and_said(monkey
     assert "Tried and left out: humidity." in worded(verdict).text
 
 
+@cache
+def of_two_halves() -> Diagnosis:
+    """The diagnosis of a campaign in which two mechanisms act by halves."""
+    return examine(made(half_and_half, seed=2), replicates=FEW)
+
+
 def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> None:
     """A swap among hundreds is stronger than chance makes any; pressure has no choices to pay for, but is within it."""
-    found = examine(made(half_and_half, seed=2), replicates=FEW)
+    found = of_two_halves()
     assert found.named is not None
     candidate, chance = found.named.weighed[0], replace(found.screened, chance_library=np.linspace(2.0, 3.0, 100))
     pressure, swap = replace(candidate, gain=3.7, raw=3.7), replace(candidate, gain=2.4, raw=8.1)
@@ -359,7 +367,7 @@ def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> 
 
 def test_mechanisms_that_the_design_tells_apart_are_rivals_not_equivalent() -> None:
     """Two laws of different shape explain the campaign about equally well: the verdict stays open between them."""
-    verdict = examine(made(half_and_half, seed=2), replicates=FEW).verdict
+    verdict = of_two_halves().verdict
     assert verdict.verdict == "undetermined"
     assert {c.mechanism for c in verdict.causes} == {"temperature", "tilt"}
     assert not verdict.equivalent

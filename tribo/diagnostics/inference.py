@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,11 +163,12 @@ def _end(f: ModelFit, index: int, k: int, bound: float, error: float) -> float:
     from scipy.optimize import brentq
 
     best = float(f.values[index][k])
-    if best == bound or f.score - _score_at(f, index, k, bound) < DROP_90:
+    score_at = cache(lambda value: _score_at(f, index, k, value))  # the search asks for its ends again
+    if best == bound or f.score - score_at(bound) < DROP_90:
         return bound
 
     def excess(share: float) -> float:
-        return f.score - _score_at(f, index, k, best + share * (bound - best)) - DROP_90
+        return f.score - score_at(best + share * (bound - best)) - DROP_90
 
     outside = 1.0
     inside = min(2.0 * error / abs(bound - best), 0.5) or 0.1
