@@ -26,8 +26,8 @@ UNIT_ENDINGS = {
     "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_mm_s": "mm/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
     "_N": "N",
     "_N_per_decade": "N", "_per_m": "1/m", "_J": "J",
-    "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_um": "um", "_pct": "percent",
-    "_percent": "percent",
+    "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_um": "um", "_Hz": "Hz",
+    "_pct": "percent", "_percent": "percent",
 }  # fmt: skip
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
 
@@ -187,6 +187,17 @@ EVENTS = {
     "stiffness",
     "recurrence_s": "time since the failure before",
     "hold_s": "time at rest before the failure: since the end of the slip before, or while the drive stood still",
+}
+FEATURES = {
+    "test_id": "the test",
+    "sample": "sample",
+    "feature": "name of the feature; see [features of a trace](features.md)",
+    "value": "its value",
+    "u": "its standard uncertainty",
+    "low": "lower end of its 95 % interval",
+    "high": "upper end",
+    "count": "number of slips or data points that it rests on",
+    "unit": "unit of value, u, low and high",
 }
 RECORD_READINGS = {
     "test_id": "the test, or the record whose strokes are tests of their own",
@@ -448,6 +459,12 @@ PRODUCTS = (
         EVENTS, "tribo.report.tables:events_table", "events", "event_row",
     ),
     Product(
+        "features.csv", "ingest",
+        "one row per feature of every trace: rise, peak and decay, stick-slip, drift and spectrum, each with its "
+        "uncertainty; see [features of a trace](features.md).",
+        FEATURES, "tribo.report.tables:features_table", "features", "feature_row",
+    ),
+    Product(
         "readings.csv", "ingest",
         "one row per reading of a record that is more than one pull from rest: plateaus, steps, cycles, running-in and "
         "holds, with 95 % intervals; see [how a record is read](../concepts/records.md).",
@@ -494,9 +511,9 @@ PRODUCTS = (
         "campaign.nc", "ingest",
         "all of the tables above but restarts, laws, dependence and differences, and the traces: HDF5 with units, "
         "readable by h5py and xarray. `xr.open_dataset(\"campaign.nc\")` gives the table of tests; "
-        "`xr.open_datatree(\"campaign.nc\")` also gives the groups `phases`, `events`, `fits`, `comparison`, "
-        "`simulated`, `budget` and `traces`. In `traces`, the samples of all traces follow each other: those of trace "
-        "k begin at `row_start[k]` and are `row_size[k]` in number.",
+        "`xr.open_datatree(\"campaign.nc\")` also gives the groups `phases`, `events`, `features`, `fits`, "
+        "`comparison`, `simulated`, `budget` and `traces`. In `traces`, the samples of all traces follow each other: "
+        "those of trace k begin at `row_start[k]` and are `row_size[k]` in number.",
         origin_in=(".nc",),
     ),
     Product(

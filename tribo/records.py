@@ -235,6 +235,28 @@ class Oscillation:
     stuck_share_u: float = float("nan")
 
 
+@displayed(lambda f: f"{f.value:.4g} ± {f.u:.2g}")
+@dataclass(frozen=True)
+class Feature:
+    """One number that describes a trace, in the unit that its name ends in; NaN where an end is not known.
+
+    Parameters
+    ----------
+    value, u : float
+        The number and its standard uncertainty.
+    low, high : float
+        Ends of its 95 % interval.
+    count : int
+        Number of slips or data points that it rests on.
+    """
+
+    value: float
+    u: float
+    low: float
+    high: float
+    count: int
+
+
 SlipChange = tuple[int, float, float]  # number of a slip (0: added), times of its failure and end (NaN: removed)
 
 
@@ -733,6 +755,8 @@ class Ingested:
     by_hand : mapping of str to Override
         Tests that have a trace, with a decision made by hand: an excluded one is also in ``set_aside``; a moved one has
         its new result in ``pulls``.
+    features : mapping of str to mapping of str to Feature
+        Features of the trace of each test, by their names in ``tribo.traces.features.FEATURES``.
     readings : tuple of Reading
         Plateaus, steps, cycles, running-in and holds of records that are more than one pull from rest.
 
@@ -749,6 +773,7 @@ class Ingested:
     set_aside: tuple[SetAside, ...]
     by_hand: Mapping[str, Override] = field(default_factory=dict)
     readings: tuple[Reading, ...] = ()
+    features: Mapping[str, Mapping[str, Feature]] = field(default_factory=dict)
 
     def doubts(self) -> tuple[SetAside, ...]:
         """Tests that were used although their row, export or pull is doubtful, for example because of a spike."""
@@ -929,6 +954,7 @@ __all__ = [
     "Correction",
     "Doubt",
     "ExportFormat",
+    "Feature",
     "Fits",
     "FloatArray",
     "Ingested",

@@ -1,4 +1,5 @@
-"""Records of a slider on a spring with Coulomb friction, in closed form, and what there is to read from them.
+"""Records of a slider on a spring with Coulomb friction, in closed form, and what there is to read from them; pulls
+from rest whose rise, peak and decay are known.
 
 A slider of mass m sticks up to the static friction F_s and slides against F_d. With w = sqrt(k/m), D = F_s - F_d and a
 drive at v the spring force while it slides is F_d + D cos(w t) + (k v / w) sin(w t): from its highest to its lowest
@@ -8,7 +9,7 @@ value it takes half a free period and falls by 2 sqrt(D^2 + (k v / w)^2). A cree
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -111,6 +112,78 @@ def random_rig(rng: np.random.Generator, quick: bool = False) -> Slider:
         rng.uniform(0.0, 0.1) * excess / stiffness * rng.integers(0, 2), per_cycle / period_s, cycles * period_s,
         noise, rng.uniform(0.3, 0.9), rng.uniform(0.03, 0.08), rng.choice([0.0, 0.01]),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FromRest:
+    """A pull from rest in closed form: a rise that bends, drops on its way, a peak, an exponential decay to a level."""
+
+    static_N: float = 2.0
+    sliding_N: float = 1.3
+    stiffness_N_per_m: float = 2000.0
+    bend: float = 0.1  # share of its first slope that the rise loses on its way to the peak
+    drops: int = 0
+    decay_m: float = 4e-4
+    speed_m_s: float = 1e-3
+    rate_Hz: float = 200.0
+    rest_s: float = 2.0
+    slides_m: float = 0.02
+    noise: float = 0.02  # of the sliding force, and so much of the force at any time
+    correlation: float = 0.6
+
+
+def pull_from_rest(rig: FromRest, seed: int) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
+    """Time, force and what is true of the features."""
+    rng = np.random.default_rng(seed)
+    k, v, top, drop = rig.stiffness_N_per_m, rig.speed_m_s, rig.static_N, rig.static_N - rig.sliding_N
+    curve = rig.bend * (2.0 - rig.bend) * k**2 / (4.0 * top)  # the slope at the peak is k (1 - bend)
+
+    def way_to(force: float) -> float:
+        """Way at which the rise k x - c x^2 reaches a force."""
+        return 2.0 * force / (k + math.sqrt(k**2 - 4.0 * curve * force))
+
+    peak_m = way_to(top)
+    time = np.arange(0.0, rig.rest_s + (peak_m + rig.slides_m) / v, 1.0 / rig.rate_Hz)
+    way = v * (time - rig.rest_s)
+    rise = k * np.clip(way, 0.0, peak_m) - curve * np.clip(way, 0.0, peak_m) ** 2
+    for at in np.linspace(0.25, 0.85, rig.drops):  # each is regained within a twentieth of the rise
+        past = (way / peak_m - at) / 0.05
+        rise = rise - 0.15 * top * np.where((past >= 0.0) & (past < 1.0), 1.0 - past, 0.0)
+    force = np.where(way <= peak_m, rise, rig.sliding_N + drop * np.exp(-np.maximum(way - peak_m, 0.0) / rig.decay_m))
+
+    def chord(low: float, high: float) -> float:
+        return (high - low) * top / (way_to(high * top) - way_to(low * top))
+
+    true = {
+        "rise_stiffness_N_per_m": chord(0.2, 0.6), "rise_bend": chord(0.6, 0.9) / chord(0.2, 0.6) - 1.0,
+        "precursor_drops": float(rig.drops), "static_drop_N": drop, "decay_length_um": 1e6 * rig.decay_m,
+        "peak_width_um": 1e6 * (peak_m - way_to(top - 0.1 * drop) + rig.decay_m * math.log(1.0 / 0.9)),
+    }  # fmt: skip
+    noisy = Slider(noise=1.0, correlation=rig.correlation, impulses=0.0)
+    return time, force + rig.noise * force * noise_of_rigs(noisy, 1.0, time.size, rng), true
+
+
+def random_pull(rng: np.random.Generator) -> FromRest:
+    """A pull of any size and rate, with the noise of real rigs."""
+    sliding = 10.0 ** rng.uniform(-1.0, 1.5)
+    static = sliding * rng.uniform(1.3, 2.2)
+    stiffness, speed = 10.0 ** rng.uniform(2.5, 4.5), 10.0 ** rng.uniform(-4.0, -2.0)
+    rise_s = static / stiffness / speed
+    rise_samples = 10.0 ** rng.uniform(2.0, 3.0)
+    decay_m = static / stiffness * 10.0 ** rng.uniform(-0.8, 0.3)
+    drops = int(rng.integers(1, 4)) if rng.random() < 0.25 else 0
+    noise = 0.01 if drops else 10.0 ** rng.uniform(-2.0, math.log10(0.04))
+    return FromRest(
+        static, sliding, stiffness, rng.uniform(0.0, 0.3), drops, decay_m,
+        speed, rise_samples / rise_s, rise_s * rng.uniform(0.3, 1.0), 20.0 * decay_m + 2.0 * static / stiffness,
+        noise, rng.uniform(0.3, 0.9),
+    )  # fmt: skip
+
+
+def population(rig: Slider, seed: int) -> dict[str, float]:
+    """The median of each number over many more slips of the same rig than a record has."""
+    many = replace(rig, duration_s=40.0 * rig.duration_s, rate_Hz=4.0 / rig.duration_s, noise=0.0, impulses=0.0)
+    return {name: float(np.nanmedian(values)) for name, values in record(many, seed)[2].items()}
 
 
 def scores(found_s: np.ndarray, true_s: np.ndarray) -> tuple[float, list[tuple[int, int]]]:

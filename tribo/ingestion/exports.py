@@ -84,24 +84,27 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
 
 
 def with_readings(ingested: Ingested) -> Ingested:
-    """A campaign with the readings of each of its records, from its pulls as they stand.
+    """A campaign with the readings of each of its records and the features of each trace, from its pulls as they stand.
 
     The tests that come from one table of an export are the parts of one record.
     """
+    from tribo.traces.features import features_of
     from tribo.traces.readings import Part, readings_of
 
+    features = {}
     records: dict[tuple[str, str], list[Part]] = {}
     for test in ingested.campaign.tests:
         trace, pull = ingested.traces.get(test.test_id), ingested.pulls.get(test.test_id)
         if trace is not None and pull is not None:
             export, choice = split_choice(test.file)
             records.setdefault((export, choice.partition("/")[0]), []).append(Part(test, trace, pull))
+            features[test.test_id] = features_of(trace, pull, test.speed_m_s)
     found = [
         reading
         for parts in records.values()
         for reading in readings_of(parts, _viscosity_Pa_s(parts[0].test, ingested.campaign))
     ]
-    return replace(ingested, readings=tuple(found))
+    return replace(ingested, readings=tuple(found), features=features)
 
 
 def _viscosity_Pa_s(test: Test, campaign: Campaign) -> float:

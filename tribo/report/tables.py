@@ -53,8 +53,8 @@ def write_tables(
     Returns
     -------
     list of Path
-        tests.csv, and restarts, phases, events, readings, fits, other_fits, laws, dependence, budget, differences,
-        comparison, diagnosis and layers as far as the study went.
+        tests.csv, and restarts, phases, events, features, readings, fits, other_fits, laws, dependence, budget,
+        differences, comparison, diagnosis and layers as far as the study went.
     """
     made = tables_of(study, diagnosis) if tables is None else tables
     return [outputs.write(out, name, table) for name, table in made.items()]
@@ -167,6 +167,18 @@ def events_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | Non
         for number, s in enumerate(pulls[test.test_id].slips, start=1)
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=outputs.product("events.csv").column_names) if rows else None
+
+
+def features_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """One row per feature of every trace that was read; None where there is none."""
+    samples = {test.test_id: test.sample for test in study.ingested.campaign.tests}
+    rows = [
+        (test_id, samples.get(test_id, ""), name, f.value, f.u, f.low, f.high, f.count, outputs.unit_of(name) or "1")
+        for test_id, found in study.ingested.features.items()
+        if test_id in study.ingested.pulls
+        for name, f in found.items()
+    ]
+    return pd.DataFrame(rows, columns=outputs.product("features.csv").column_names) if rows else None
 
 
 def readings_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:

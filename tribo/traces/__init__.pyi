@@ -6,6 +6,7 @@ from .evaluation import (
     read_pulls as read_pulls,
 )
 from .events import slips_of as slips_of
+from .features import features_of as features_of
 from .phases import phases_of as phases_of
 from .rules import RULES as RULES, Rule as Rule
 from .sliding import oscillation_of as oscillation_of
