@@ -24,7 +24,7 @@ __all__ = [
     "agreement", "cycles", "dependence", "evidence", "extended", "finding", "forces", "law", "laws_against_area",
     "levels", "misfit", "oscillations", "power", "published", "published_readings", "pull", "pulls",
     "ratio_against_pressure", "records", "residuals", "restarts", "run", "running_in", "simulated_pulls",
-    "sliding_force", "static_force",
+    "sliding_force", "static_force", "traces",
 ]  # fmt: skip
 
 
@@ -78,6 +78,9 @@ ratio_against_pressure = _of_study(
 )
 simulated_pulls = _of_study(
     "simulated_pulls", "Pattern, model and simulated T/N against time, one run per sample.", "fig5"
+)
+traces = _of_study(
+    "traces", "Measured trace of a pull of each sample over that of the model, as its machine would record it."
 )
 static_force = _of_study(
     "static_force", "Static friction force of every pull against load, with fit and model.", "fig6"

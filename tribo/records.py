@@ -860,6 +860,9 @@ class Study:
         angle_deg, seed, static_N, sliding_N.
     example_runs : tuple of Run
         One full force trace of the model per sample.
+    recorded_runs : mapping of str to (Trace, Pull, mapping of str to Feature)
+        By the id of a test beside it, the example run of its sample as the machine of the campaign would record it,
+        with what the readers read of it.
     budget : DataFrame, optional
         Uncertainty budget of every fitted number, one row per component.
     power : tuple of str
@@ -892,6 +895,7 @@ class Study:
     comparison: Comparison | None = None
     simulated: pd.DataFrame | None = None
     example_runs: tuple[Run, ...] = ()
+    recorded_runs: Mapping[str, tuple[Trace, Pull, Mapping[str, Feature]]] = field(default_factory=dict)
     budget: pd.DataFrame | None = None
     power: tuple[str, ...] = ()
     outlying: tuple[str, ...] = ()

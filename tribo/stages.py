@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from tribo.cache.kept_results import kept_or_made
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
@@ -15,11 +17,16 @@ from tribo.display import displayed
 from tribo.errors import FitError, SimulationError
 from tribo.records import (
     Campaign,
+    Feature,
     Fits,
     Ingested,
     LawFit,
+    Pull,
+    Run,
     Study,
+    Trace,
 )
+from tribo.zeroing import DEFAULT as AUTOMATIC_ZERO
 
 if TYPE_CHECKING:
     from tribo.comparison.prediction import Cell, ModelRuns
@@ -282,7 +289,57 @@ def compare(
     comparison, simulated, example_runs = predict(
         ingested, alone, flat, calibrated, model, weights=options.weights, progress=progress
     )
-    return Study(ingested, fits, comparison=comparison, simulated=simulated, example_runs=example_runs)
+    return Study(
+        ingested, fits, comparison=comparison, simulated=simulated, example_runs=example_runs,
+        recorded_runs=_as_recorded(ingested, example_runs, flat, options.rule),
+    )  # fmt: skip
+
+
+def _as_recorded(
+    ingested: Ingested, runs: Iterable[Run], flat: str, rule: str
+) -> dict[str, tuple[Trace, Pull, Mapping[str, Feature]]]:
+    """The example run of each sample as recorded by the machine of the campaign, by the test that it lies beside.
+
+    That test is of the load nearest to the run. The stiffness of the machine is the one stated, else that of the rise
+    of the flat sample; a test without a speed or a rise has no run beside it.
+    """
+    from tribo.errors import TraceError
+    from tribo.mechanisms_in_model import Recorder, as_recorded
+    from tribo.traces import PullOptions, evaluate, features_of
+
+    area = ingested.campaign.area_m2
+    found: dict[str, tuple[Trace, Pull, Mapping[str, Feature]]] = {}
+    rises: dict[str, list[float]] = {}
+    for test in ingested.campaign.tests:
+        if (rise := ingested.features.get(test.test_id, {}).get("rise_stiffness_N_per_m")) is not None:
+            rises.setdefault(test.sample, []).append(rise.value)
+    for run in runs:
+        load = area * run.pressure_Pa
+        tests = [t for t in ingested.campaign.tests if t.sample == run.sample and t.test_id in ingested.traces]
+        tests = [t for t in tests if t.test_id in ingested.pulls and np.isfinite(ingested.pulls[t.test_id].static_N)]
+        tests = [t for t in tests if t.speed_m_s]
+        if not tests or flat not in rises:
+            continue
+        nearest = min(abs(np.log(t.normal_load_N / load)) for t in tests)
+        beside = [t for t in tests if abs(np.log(t.normal_load_N / load)) <= nearest + 1e-6]
+        middle = float(np.median([ingested.pulls[t.test_id].static_N for t in beside]))
+        test = min(beside, key=lambda t: abs(ingested.pulls[t.test_id].static_N - middle))
+        pull, trace = ingested.pulls[test.test_id], ingested.traces[test.test_id]
+        rate = 1.0 / float(np.median(np.diff(trace.time_s)))
+        speed = float(test.speed_m_s or np.nan)
+        stiffness = test.stiffness_N_per_m or float(np.median(rises[flat]))
+        way = speed * float(trace.time_s[-1] - (pull.peak_s if np.isfinite(pull.peak_s) else trace.time_s[0]))
+        noise = pull.noise_N if np.isfinite(pull.noise_N) else 0.0
+        shown = as_recorded(
+            run, Recorder(rate, noise), speed_m_s=speed, stiffness_N_per_m=stiffness, nominal_area_m2=area,
+            slides_m=max(way, 0.0),
+        )  # fmt: skip
+        try:
+            read = evaluate(shown, PullOptions(rule, test=replace(test, normal_load_N=load, zero=AUTOMATIC_ZERO)))
+        except TraceError:
+            continue  # a recorder too slow for the run
+        found[test.test_id] = shown, read, features_of(shown, read, speed)
+    return found
 
 
 def study(

@@ -51,6 +51,7 @@ def test_the_numbers_of_a_figure_are_what_it_draws(name: str, study: Study) -> N
         "fig6": ("normal_load_N", "T_N"),
         "fig7": ("normal_load_N", "T_N"),
         "fig8": ("area_fraction", "value"),
+        "traces": ("way_mm", "force_N"),
     }[name]
     points = numbers[[x, y]].dropna().to_numpy(float)
     expected = {(float(f"{a:.6g}"), float(f"{b:.6g}")) for a, b in points}

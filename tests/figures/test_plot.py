@@ -16,7 +16,7 @@ from tribo.records import Study
 
 OF_ONE = {"pull", "run"}
 OF_A_STUDY = ("agreement", "pulls", "ratio_against_pressure", "simulated_pulls", "static_force", "sliding_force",
-              "laws_against_area")  # fmt: skip
+              "laws_against_area", "traces")  # fmt: skip
 
 
 def test_every_figure_of_a_report_has_its_function_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:

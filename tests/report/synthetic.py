@@ -223,7 +223,11 @@ def make_study(
     model = [make_fit(s, r, simulated[simulated["sample"] == s], "ensemble", 10.0) for s, r in pairs]
     runs = tuple(make_run(s, ingested.campaign.area_fraction(s)) for s in samples)
     comparison = compare(ingested.campaign, samples, fits, model)
-    return Study(ingested, tuple(fits), tuple(other), comparison, simulated, runs, notes=("a note of the study",))
+    beside = {t.sample: t.test_id for t in ingested.campaign.tests if t.test_id in ingested.traces}
+    recorded = {i: (ingested.traces[i], ingested.pulls[i], {}) for i in beside.values()}
+    return Study(
+        ingested, tuple(fits), tuple(other), comparison, simulated, runs, recorded, notes=("a note of the study",)
+    )  # fmt: skip
 
 
 def verdict_of(plain: Mapping[str, Any]) -> Verdict:

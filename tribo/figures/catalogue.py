@@ -13,7 +13,7 @@ from tribo.figures.one_pull import EXAMPLE_PULLS
 from tribo.figures.programmes import CYCLES, LEVELS, RUNNING_IN
 from tribo.figures.published_table import PUBLISHED, PUBLISHED_READINGS
 from tribo.figures.residuals import FINDING, RESIDUALS
-from tribo.figures.simulated import SIMULATED_PULLS
+from tribo.figures.simulated import COMPARED_TRACES, SIMULATED_PULLS
 from tribo.figures.style import FigureOf, StudyFigure
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def _by_name(*figures: FigureOf[Any]) -> dict[str, FigureOf[Any]]:
 
 
 FIGURES: dict[str, StudyFigure] = _by_name(
-    AGREEMENT, EXAMPLE_PULLS, RATIO, SIMULATED_PULLS, STATIC_FORCE, SLIDING_FORCE, LAWS_AGAINST_AREA
+    AGREEMENT, EXAMPLE_PULLS, RATIO, SIMULATED_PULLS, COMPARED_TRACES, STATIC_FORCE, SLIDING_FORCE, LAWS_AGAINST_AREA
 )
 """The figures of a study by name."""
 

@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from tribo.comparison import study_lookup
 from tribo.figures import style
@@ -260,4 +261,82 @@ SIMULATED_PULLS = style.StudyFigure(
     "one run for each sample. Filled marker: static peak. Dotted line: mean over the sliding window.",
     runs_numbers,
     draw_runs,
+)
+
+COMPARED_COLUMNS = [
+    "sample_number", "sample", "test_id", "normal_load_N", "source", "way_mm", "force_N", "rise_N_per_mm", "drop_N",
+    "decay_um",
+]  # fmt: skip
+COMPARED = {  # column: (feature, factor, words)
+    "rise_N_per_mm": ("rise_stiffness_N_per_m", 1e-3, "rise {} / {} N/mm"),
+    "drop_N": ("static_drop_N", 1.0, "drop {} / {} N"),
+    "decay_um": ("decay_length_um", 1.0, "decay {} / {} µm"),
+}
+_BEFORE, _AFTER = 0.15, 3.0  # of the way from onset to peak: how much is drawn before the rise, and after the peak
+
+
+def compared_numbers(study: Study) -> pd.DataFrame:
+    """Force (N) over the way of the drive (mm) from the onset of the rise: a pull and the run beside it."""
+    ingested, order = study.ingested, study_lookup.sample_numbers(study)
+    tests = {test.test_id: test for test in ingested.campaign.tests}
+    frames = []
+    for test_id, (run, read, features) in study.recorded_runs.items():
+        test, pull = tests[test_id], ingested.pulls[test_id]
+        speed = test.speed_m_s or np.nan  # a test without one has no run beside it
+        both = {
+            "measured": (ingested.traces[test_id], pull, ingested.features.get(test_id, {})),
+            "simulated": (run, read, features),
+        }
+        rise_s = pull.peak_s - pull.onset_s
+        for source, (trace, one, found) in both.items():
+            since = trace.time_s - one.onset_s
+            shown = (since > -_BEFORE * rise_s) & (since < (1.0 + _AFTER) * rise_s)
+            way, force = thin_trace(1e3 * speed * since[shown], trace.force_N[shown] - one.zero_N, 600)
+            values = {
+                column: factor * found[name].value if name in found else np.nan
+                for column, (name, factor, _) in COMPARED.items()
+            }
+            about: dict[str, Any] = {"sample": test.sample, "test_id": test_id, "source": source}
+            frame = pd.DataFrame({"way_mm": way, "force_N": force})
+            about |= {"sample_number": order.get(test.sample, 0), "normal_load_N": test.normal_load_N, **values}
+            frames.append(frame.assign(**about)[COMPARED_COLUMNS])
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=COMPARED_COLUMNS)
+
+
+@style.in_house_style
+def draw_compared(numbers: pd.DataFrame) -> Figure:
+    """One panel per sample: the measured trace, the simulated one, and in numbers what differs."""
+    figure, panels = style.sample_panels(numbers, 52, "Displacement (mm)", "Friction force T (N)")
+    for ax, rows in panels:
+        measured, simulated = (rows[rows["source"] == source] for source in ("measured", "simulated"))
+        ax.plot(measured["way_mm"], measured["force_N"], color=style.BLUE, lw=0.9)
+        ax.plot(simulated["way_mm"], simulated["force_N"], color=style.VERMILLION, lw=0.9)
+        first, second = measured.iloc[0], simulated.iloc[0]
+        said = [
+            words.format(*(f"{row[column]:.3g}" if np.isfinite(row[column]) else "–" for row in (first, second)))
+            for column, (_, _, words) in COMPARED.items()
+        ]
+        ax.text(0.98, 0.96, "\n".join(said), transform=ax.transAxes, ha="right", va="top", fontsize="x-small")
+        ax.set_ylim(top=1.25 * float(rows["force_N"].max()))
+        style.panel_title(ax, first["sample"], f"N = {first['normal_load_N']:.3g} N, test {first['test_id']}")
+    style.legend_below(
+        figure,
+        [
+            Line2D([], [], color=style.BLUE, lw=0.9, label="measured, zero subtracted"),
+            Line2D([], [], color=style.VERMILLION, lw=0.9, label="model, as the machine would record it"),
+        ],
+    )
+    return figure
+
+
+COMPARED_TRACES = style.StudyFigure(
+    "traces",
+    "Measured and simulated traces",
+    "Friction force over the way of the drive, aligned at the onset of the rise: a typical pull of each sample and the "
+    "model, calibrated on the flat sample, as the machine of the campaign would record it, with its stiffness, speed, "
+    "rate and noise. After the short run of the model its mean sliding force goes on. In numbers, measured / "
+    "simulated: slope of the rise, drop from static peak to sliding, length of the decay after the peak; – where it "
+    "is not resolved.",
+    compared_numbers,
+    draw_compared,
 )

@@ -12,8 +12,9 @@ sled. An ideal chain leaves a run unchanged, bit for bit.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +22,7 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Placement, Values
-from tribo.records import FloatArray, Pattern, Run
+from tribo.records import FloatArray, Pattern, Run, Trace
 from tribo.springblock.config import LocalFriction, SimConfig
 from tribo.springblock.engines import ENGINES
 from tribo.springblock.engines.state import Thresholds, lattice_of, thresholds_of
@@ -116,6 +117,99 @@ def sampled(run: Run, interval_s: float) -> Run:
     after = np.interp(run.peak_s + interval_s / 2, run.time_s, run.force_N)
     static = max(float(before), float(after)) / run.normal_load_N
     return replace(run, time_s=time, force_N=force, moving=moving, static_friction=min(static, run.static_friction))
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """What stands between the force at the machine and the numbers in an export.
+
+    Parameters
+    ----------
+    rate_Hz : float
+        Data points per second.
+    noise_N : float
+        Standard deviation of white noise in N.
+    resolution_N : float
+        Step of the recorded force in N; 0 for none.
+    filter_Hz : float
+        Corner of a low-pass filter of first order before sampling in Hz; 0 for none.
+    """
+
+    rate_Hz: float
+    noise_N: float = 0.0
+    resolution_N: float = 0.0
+    filter_Hz: float = 0.0
+
+
+def as_recorded(
+    run: Run,
+    recorder: Recorder,
+    *,
+    speed_m_s: float,
+    stiffness_N_per_m: float = math.inf,
+    nominal_area_m2: float = SLED_AREA_M2,
+    slides_m: float = 0.0,
+    seed: int = 0,
+) -> Trace:
+    """A run of the model as an export of a machine, which the readers of traces read as any other.
+
+    The force is that of the whole sled. The drive moves on by the stretch of the machine as well
+    (:func:`with_compliance`), so that most of a rise on a soft machine is the machine. A second of rest comes first.
+
+    Parameters
+    ----------
+    run : Run
+        A run of the model.
+    recorder : Recorder
+        Rate, noise, resolution and filter.
+    speed_m_s : float
+        Speed of the drive of the machine in m/s. The time of the model is not that of the machine: both agree in the
+        way of the drive.
+    stiffness_N_per_m : float
+        Stiffness of machine and wire in N/m.
+    nominal_area_m2 : float
+        Nominal area of the sled in m2.
+    slides_m : float
+        Way in m by which the slide goes on at its mean force after the end of the run, which is short.
+    seed : int
+        Seed of the noise.
+
+    Returns
+    -------
+    Trace
+        Time in s, force in N and displacement of the drive in m.
+
+    Examples
+    --------
+    >>> import tribo
+    >>> from tribo.mechanisms_in_model import Recorder, as_recorded
+    >>> run = tribo.simulate(tribo.SimConfig(blocks=(8, 8), dt_s=2e-7, duration_peaks=1.5))
+    >>> trace = as_recorded(run, Recorder(50.0), speed_m_s=2e-4, stiffness_N_per_m=6000.0, slides_m=1e-3)
+    >>> round(1e3 * trace.displacement_m[-1], 1)
+    1.5
+    """
+    from scipy.signal import lfilter
+
+    sleds = nominal_area_m2 * run.pressure_Pa / run.normal_load_N
+    model_speed = float(run.parameters.get("speed_m_s", speed_m_s))
+    force = run.force_N * sleds
+    way = np.maximum.accumulate(run.time_s * model_speed + force / stiffness_N_per_m)
+    level = run.sliding_friction * run.normal_load_N * sleds
+    way, force = np.append(way, way[-1] + [0.0, max(slides_m, 1e-12)]), np.append(force, [level, level])
+    rest_m = speed_m_s * 1.0
+    fine = max(1, math.ceil(20.0 * recorder.filter_Hz / recorder.rate_Hz))  # a filter acts before the samples are taken
+    displacement = np.arange(-rest_m, way[-1], speed_m_s / recorder.rate_Hz / fine)
+    found = np.interp(displacement, way, force, left=0.0)
+    if recorder.filter_Hz > 0:
+        keeps = math.exp(-2.0 * math.pi * recorder.filter_Hz / (recorder.rate_Hz * fine))
+        found = np.asarray(lfilter([1.0 - keeps], [1.0, -keeps], found))
+    displacement, found = displacement[::fine], found[::fine]
+    if recorder.noise_N > 0:
+        found = found + recorder.noise_N * np.random.default_rng(seed).standard_normal(found.size)
+    if recorder.resolution_N > 0:
+        found = np.round(found / recorder.resolution_N) * recorder.resolution_N
+    time = (displacement - displacement[0]) / speed_m_s
+    return Trace(f"{run.sample}, model", time, found, displacement_m=displacement - displacement[0])
 
 
 RECORDED = {
