@@ -36,6 +36,7 @@ from tribo.springblock.engines.state import (
     Trajectory,
     drive_of,
     first_failure_s,
+    longest_rise_s,
     observe,
     sliding_threshold,
     static_threshold,
@@ -59,7 +60,8 @@ def integrate(config: SimConfig, lattice: Lattice, thresholds: Thresholds, threa
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
     state, numerics = at_rest(config, lattice, thresholds, drive, failure - 1.5 * config.dt_s)
     kept: list[Samples] = []
-    for samples, step in in_chunks(config, thresholds, state, numerics, kept):
+    longest = longest_rise_s(config, lattice, thresholds, drive)
+    for samples, step in in_chunks(config, longest, state, numerics, kept):
         advance_dense(state, samples, numerics, step, lattice, drive.follow)
     return trajectory_of(kept, state, numerics, drive, failure)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
-from tribo.springblock.engines.state import Trajectory
+from tribo.springblock.engines.state import Trajectory, drive_of
 from tribo.springblock.lattice import NEIGHBOURHOOD, Lattice
 
 
@@ -16,7 +16,7 @@ from tribo.springblock.lattice import NEIGHBOURHOOD, Lattice
 class EnergyBalance:
     """Energies of one run in joule, from rest at t = 0 to its end."""
 
-    work_J: float  # of the slider: the integral of force times speed
+    work_J: float  # of the drive: the integral of force times speed, and what the slider has where the run begins
     elastic_J: float
     kinetic_J: float
     friction_J: float
@@ -32,16 +32,36 @@ class EnergyBalance:
 def energy_balance(config: SimConfig, lattice: Lattice, trajectory: Trajectory) -> EnergyBalance:
     """Balance of a run."""
     angle = np.deg2rad(config.angle_deg)
-    slider = config.speed_m_s * trajectory.end_s * np.array([np.cos(angle), np.sin(angle)])
+    driven = config.speed_m_s * trajectory.end_s
+    way = trajectory.slider_m if config.machine_stiffness_N_per_m else driven
+    slider = way * np.array([np.cos(angle), np.sin(angle)])
     u, v = trajectory.displacement_m, trajectory.velocity_m_s
-    shear = 0.5 * config.shear_stiffness_N_m * float(((slider - u) ** 2).sum())
+    pulled = u if lattice.pulled is None else u[lattice.pulled]
+    shear = 0.5 * config.shear_stiffness_N_m * float(((slider - pulled) ** 2).sum())
+    machine = 0.5 * (config.machine_stiffness_N_per_m or 0.0) * (driven - way) ** 2
+    mass = config.moved_mass_kg if config.machine_stiffness_N_per_m else 0.0
+    work = config.speed_m_s * trajectory.end_impulse_Ns
+    if config.machine_stiffness_N_per_m is not None:
+        work = _of_the_start(config, lattice, trajectory) + config.speed_m_s * (
+            trajectory.end_impulse_Ns - trajectory.impulse_Ns[1]
+        )
     return EnergyBalance(
-        work_J=config.speed_m_s * trajectory.end_impulse_Ns,
-        elastic_J=shear + _spring_energy(config, lattice, u) + trajectory.bond_energy_J,
-        kinetic_J=0.5 * config.mass_kg * float((v**2).sum()),
+        work_J=work,
+        elastic_J=machine + shear + _spring_energy(config, lattice, u) + trajectory.bond_energy_J,
+        kinetic_J=0.5 * (config.mass_kg * float((v**2).sum()) + mass * trajectory.slider_m_s**2),
         friction_J=trajectory.friction_work_J,
-        viscous_J=trajectory.viscous_work_J,
+        viscous_J=trajectory.viscous_work_J + trajectory.damper_work_J,
     )
+
+
+def _of_the_start(config: SimConfig, lattice: Lattice, trajectory: Trajectory) -> float:
+    """Energy in the springs and the slider where a run on a machine begins, on its quasi-static rise."""
+    stiffness, damping = config.machine_stiffness_N_per_m or 0.0, config.machine_damping_N_s_per_m or 0.0
+    pace, force = drive_of(config, lattice).pace, float(trajectory.force_N[1])
+    stretch = (force - damping * config.speed_m_s * (1.0 - pace)) / stiffness
+    way = config.speed_m_s * float(trajectory.time_s[1]) - stretch
+    moving = 0.5 * config.moved_mass_kg * (pace * config.speed_m_s) ** 2
+    return 0.5 * stiffness * stretch**2 + 0.5 * force * way + moving
 
 
 def _spring_energy(config: SimConfig, lattice: Lattice, u: FloatArray) -> float:

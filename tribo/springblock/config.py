@@ -84,6 +84,8 @@ OPEN_CHOICES: dict[str, Any] = {
     "sticking": "turned",
     "stick_interval_s": None,
     "contact_stiffness_Pa_per_m": None,
+    "pulled_edge": None,
+    "machine_stiffness_N_per_m": None,
 }
 """What the text leaves open and changes a run, with the values of the reading "text"."""
 
@@ -112,6 +114,8 @@ Edges = Literal["free", "periodic"]
 Rotation = Literal["small", "finite"]
 Sticking = Literal["turned", "slow", "never"]
 BlockMass = Literal["layer", "cube"]
+PulledEdge = Literal["leading", "trailing"]
+STANDARD_GRAVITY_M_S2 = 9.80665
 
 
 @displayed(lambda c: f"{c.sample} at {c.pressure_Pa / 1e3:.4g} kPa, seed {c.seed}")
@@ -141,6 +145,14 @@ class SimConfig:
     contact_stiffness_Pa_per_m
         Stiffness kappa of contact per area: a spring kappa l2 binds each contact block to the track and yields at its
         static threshold. None, the reading of the paper, is rigid contact. A stiffer one needs a shorter step.
+    pulled_edge
+        "leading" or "trailing": the slider pulls only the row of blocks at that edge, each by K_s. None, the reading of
+        the paper, is a slider over all blocks. The row is the one across x or y, whichever is nearer to the pull.
+    machine_stiffness_N_per_m, slider_mass_kg, machine_damping_N_s_per_m
+        A spring and a damper (none by default) between the drive, which moves at ``speed_m_s``, and the slider, which
+        has this mass (by default that of the nominal load). They are those of the machine times the share of the
+        nominal area that is simulated. The force of a run is then that between drive and slider. None is a slider that
+        moves at ``speed_m_s`` whatever the force. The run begins on the even rise, without the swing of the start.
     blocks, spacing_m, thickness_m
         Blocks along x and y, their distance l, and the layer thickness l_z (l by default).
     block_mass
@@ -198,6 +210,10 @@ class SimConfig:
     stick_speed_m_s: float = 2e-4
     stick_interval_s: float | None = None
     contact_stiffness_Pa_per_m: float | None = None
+    pulled_edge: PulledEdge | None = None
+    machine_stiffness_N_per_m: float | None = None
+    slider_mass_kg: float | None = None
+    machine_damping_N_s_per_m: float | None = None
     blocks: tuple[int, int] = (85, 85)
     spacing_m: float = 5e-6
     thickness_m: float | None = None
@@ -274,14 +290,31 @@ class SimConfig:
         return self.pressure_Pa * self.spacing_m**2 * self.blocks[0] * self.blocks[1]
 
     @property
+    def moved_mass_kg(self) -> float:
+        """Mass of the slider on a machine of finite stiffness: by default that whose weight is the nominal load."""
+        return self.normal_load_N / STANDARD_GRAVITY_M_S2 if self.slider_mass_kg is None else self.slider_mass_kg
+
+    @property
+    def pulled_side(self) -> tuple[int, int] | None:
+        """Axis (0, x; 1, y) and end (0 or -1) of the row that is pulled; None where all blocks are."""
+        if self.pulled_edge is None:
+            return None
+        along = (math.cos(math.radians(self.angle_deg)), math.sin(math.radians(self.angle_deg)))
+        axis = 0 if abs(along[0]) >= abs(along[1]) else 1
+        return axis, -1 if (along[axis] > 0.0) == (self.pulled_edge == "leading") else 0
+
+    @property
     def largest_dt_s(self) -> float:
-        """Where the explicit step turns unstable: the stiffest lattice mode with its damping."""
+        """Where the explicit step turns unstable: the stiffest lattice mode, or the slider on its machine."""
+        slider = math.inf
+        if self.machine_stiffness_N_per_m is not None:
+            springs = self.blocks[0] * self.blocks[1] * self.shear_stiffness_N_m
+            omega2 = (self.machine_stiffness_N_per_m + springs) / self.moved_mass_kg
+            slider = _stable_step(omega2, (self.machine_damping_N_s_per_m or 0.0) / self.moved_mass_kg)
         omega2 = (
             STIFFEST * self.stiffness_N_m + self.shear_stiffness_N_m + self.bond_stiffness_N_m
         ) / self.mass_kg
-        # v' = (1 - g dt) v - w2 dt x, x' = x + dt v' is stable while (w dt)^2 < 4 - 2 g dt
-        g = self.damping_per_s
-        return (math.sqrt(g**2 + 4.0 * omega2) - g) / omega2
+        return min(slider, _stable_step(omega2, self.damping_per_s))
 
     def check(self) -> SimConfig:
         """This configuration, or SimulationError with everything that is wrong with it."""
@@ -313,6 +346,11 @@ class SimConfig:
         return flat
 
 
+def _stable_step(omega2: float, g: float) -> float:
+    """v' = (1 - g dt) v - w2 dt x, x' = x + dt v' is stable while (w dt)^2 < 4 - 2 g dt."""
+    return (math.sqrt(g**2 + 4.0 * omega2) - g) / omega2
+
+
 def _unknown_sample(sample: str) -> Problem:
     return Problem(
         "unknown_sample", "not a sample of the paper, and no pattern is given", column="sample", found=sample,
@@ -324,11 +362,13 @@ def _unknown_sample(sample: str) -> Problem:
 _POSITIVE = {
     "stick_speed_m_s", "stick_interval_s", "pressure_Pa", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3",
     "speed_m_s", "shear_factor", "dt_s", "duration_s", "sample_interval_s", "rest_tolerance", "ageing_t0_s",
-    "speed_v0_m_s", "contact_stiffness_Pa_per_m",
+    "speed_v0_m_s", "contact_stiffness_Pa_per_m", "machine_stiffness_N_per_m", "slider_mass_kg",
 }  # fmt: skip
-_NOT_NEGATIVE = {"damping_per_s", "mu_s", "mu_s_sd", "mu_d", "mu_d_sd", "ageing_b", "hold_s"}
+_NOT_NEGATIVE = {
+    "damping_per_s", "mu_s", "mu_s_sd", "mu_d", "mu_d_sd", "ageing_b", "hold_s", "machine_damping_N_s_per_m",
+}  # fmt: skip
 _BEYOND_THE_PEAK = {"duration_peaks", "window_start_peaks", "window_end_peaks"}
-_CHOICES: dict[str, tuple[str, ...]] = {
+_CHOICES: dict[str, tuple[str | None, ...]] = {
     "normal_force": ("redistributed", "uniform"),
     "edges": ("free", "periodic"),
     "cavity_shape": ("square", "round", "exact"),
@@ -336,10 +376,12 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "peak_rule": ("highest", "first"),
     "block_mass": ("layer", "cube"),
     "sticking": ("turned", "slow", "never"),
+    "pulled_edge": (None, "leading", "trailing"),
 }
 _OF_THE_STEP = {
     "dt_s", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "damping_per_s", "shear_factor",
-    "contact_stiffness_Pa_per_m",
+    "contact_stiffness_Pa_per_m", "machine_stiffness_N_per_m", "slider_mass_kg", "machine_damping_N_s_per_m",
+    "pressure_Pa", "blocks",
 }  # fmt: skip
 _OF_THE_GEOMETRY = {"spacing_m", "edges", "cavity_shape"}
 _OF_THE_WINDOW = {"window_start_peaks", "window_end_peaks"}
@@ -357,6 +399,17 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
     faulty = {problem.column for problem in faults}
     if not faulty & _OF_THE_GEOMETRY:
         yield from _geometry_problems(config)
+    for name in ("slider_mass_kg", "machine_damping_N_s_per_m"):
+        if getattr(config, name) is not None and config.machine_stiffness_N_per_m is None:
+            yield Problem(
+                "no_machine", "needs the stiffness of the machine", column=name, found=f"{getattr(config, name):g}",
+                allowed="machine_stiffness_N_per_m beside it",
+            )  # fmt: skip
+    if config.pulled_edge is not None and config.edges == "periodic":
+        yield Problem(
+            "no_edge", "periodic edges leave no edge to pull", column="pulled_edge", found=config.pulled_edge,
+            allowed="edges free",
+        )  # fmt: skip
     if not faulty & _OF_THE_STEP and config.dt_s > config.largest_dt_s:
         yield Problem(
             "unstable_step", "the time step exceeds the stability limit", column="dt_s",
@@ -429,8 +482,9 @@ def _choice_problems(config: SimConfig) -> Iterator[Problem]:
         value = getattr(config, name)
         if value not in allowed:
             yield Problem(
-                "unknown_choice", f"unknown {name}", column=name, found=str(value), allowed=" or ".join(allowed)
-            )
+                "unknown_choice", f"unknown {name}", column=name, found=str(value),
+                allowed=" or ".join(filter(None, allowed)),
+            )  # fmt: skip
     if not (isinstance(config.seed, int) and config.seed >= 0):
         yield Problem("seed", "not a seed", column="seed", found=str(config.seed), allowed="a whole number >= 0")
     for name, possible in (

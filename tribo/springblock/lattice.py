@@ -144,11 +144,17 @@ class Lattice:
     follow: FloatArray  # (n + 1, 2, 2)
     lag: FloatArray  # (n + 1, 2, 2)
     bond: FloatArray | None = None  # (n,) zero on cavities
+    pulled: NDArray[np.int64] | None = None  # blocks that the slider pulls; None where it pulls all
     touching: FloatArray | None = None  # (n,) share of each block that touches; None where it is all or nothing
 
     @property
     def area_fraction(self) -> float:
         return float(self.contact.mean() if self.touching is None else self.touching.mean())
+
+    @property
+    def slider(self) -> FloatArray:
+        """Stiffness of the spring between each block and the slider, zero where none is; (n,)."""
+        return _slider(self.contact.size, self.shear, self.pulled)
 
     def spring_forces(self, displacement: FloatArray) -> FloatArray:
         """Elastic force on every block per unit K_int, springs to neighbours and own stiffness; (n, 2)."""
@@ -165,20 +171,31 @@ class Lattice:
 
 
 def make_lattice(
-    mask: BoolArray | FloatArray, shear: float, periodic: bool, bond: float | None = None
+    mask: BoolArray | FloatArray,
+    shear: float,
+    periodic: bool,
+    bond: float | None = None,
+    pulled_side: tuple[int, int] | None = None,
 ) -> Lattice:
     """Lattice of a contact mask (ny, nx), or of the share of each block that touches.
 
-    ``shear`` is K_s / K_int, ``bond`` the stiffness of contact, None if rigid. One factorisation a mask is kept.
+    ``shear`` is K_s / K_int, ``bond`` the stiffness of contact, None if rigid; ``pulled_side`` the axis and end of the
+    row that alone is pulled. One factorisation a mask is kept.
     """
     shares = b"" if mask.dtype == bool else mask.tobytes()
     packed = np.packbits(mask > 0).tobytes()
-    return _make_lattice(packed, mask.shape, shear, periodic, bond, shares)
+    return _make_lattice(packed, mask.shape, shear, periodic, bond, shares, pulled_side)
 
 
 @lru_cache(maxsize=16)
 def _make_lattice(
-    packed: bytes, shape: tuple[int, int], shear: float, periodic: bool, stiffness: float | None, shares: bytes
+    packed: bytes,
+    shape: tuple[int, int],
+    shear: float,
+    periodic: bool,
+    stiffness: float | None,
+    shares: bytes,
+    pulled_side: tuple[int, int] | None,
 ) -> Lattice:
     ny, nx = shape
     n = nx * ny
@@ -187,16 +204,26 @@ def _make_lattice(
     own = np.zeros((n + 1, 3))
     for k, spring in enumerate(SPRINGS):
         own[:n] += np.where(neighbours[:n, k, None] < n, spring, 0.0)
-    own[:n, :2] += shear
+    numbers = np.arange(n).reshape(ny, nx)
+    pulled = None if pulled_side is None else np.take(numbers, pulled_side[1], axis=1 - pulled_side[0])
+    slider = _slider(n, shear, pulled)
+    own[:n, :2] += slider[:, None]
     touching = np.frombuffer(shares) if shares else None
     bond = None if stiffness is None else np.where(contact, stiffness, 0.0) * (1.0 if touching is None else touching)
     if bond is None:
-        follow, lag = _condense(np.flatnonzero(~contact), neighbours, own, shear)
+        follow, lag = _condense(np.flatnonzero(~contact), neighbours, own, slider)
     else:
         held = own.copy()
         held[:n, :2] += bond[:, None]
-        follow, lag = _condense(np.arange(n), neighbours, held, shear)
-    return Lattice(nx, ny, periodic, shear, contact, neighbours, own, follow, lag, bond, touching)
+        follow, lag = _condense(np.arange(n), neighbours, held, slider)
+    return Lattice(nx, ny, periodic, shear, contact, neighbours, own, follow, lag, bond, pulled, touching)
+
+
+def _slider(n: int, shear: float, pulled: NDArray[np.int64] | None) -> FloatArray:
+    stiffness = np.full(n, shear if pulled is None else 0.0)
+    if pulled is not None:
+        stiffness[pulled] = shear
+    return stiffness
 
 
 def _neighbours(nx: int, ny: int, periodic: bool) -> NDArray[np.int64]:
@@ -212,7 +239,7 @@ def _neighbours(nx: int, ny: int, periodic: bool) -> NDArray[np.int64]:
 
 
 def _condense(
-    moving: NDArray[np.intp], neighbours: NDArray[np.int64], own: FloatArray, shear: float
+    moving: NDArray[np.intp], neighbours: NDArray[np.int64], own: FloatArray, slider: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """K w = K_s V and K z = w over the blocks that move: velocities, and lag per drag, for unit V along x and y."""
     follow, lag = np.zeros((len(own), 2, 2)), np.zeros((len(own), 2, 2))
@@ -221,7 +248,7 @@ def _condense(
     solve = _factorise(moving, neighbours, own)
     m = moving.size
     drive = np.zeros((2 * m, 2))
-    drive[:m, 0] = drive[m:, 1] = shear
+    drive[:m, 0] = drive[m:, 1] = slider[moving]
     w = solve(drive)
     z = solve(w)
     for axis in range(2):

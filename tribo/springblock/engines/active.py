@@ -22,16 +22,22 @@ from tribo.springblock.engines.jit import compiled, copied_into_callers, inner
 from tribo.springblock.engines.state import (
     ACTIVE_STEPS,
     ALONG,
+    CARRIED,
     CODE,
     FRICTION_WORK,
     N_FAILED,
     RUNNING,
+    SLIDER,
     STEP,
     VISCOUS_WORK,
     Numerics,
     Samples,
     State,
+    accelerate_slider,
+    drag_rate,
+    move_slider,
     observe,
+    slider_time,
     static_threshold,
 )
 from tribo.springblock.engines.strips import (
@@ -271,7 +277,7 @@ def hold_cavities(strip: int, hold: float, p: Planes, elastic: bool | None) -> N
 
 @inner
 def load_on(i: int, t: float, p: Planes, c: Numerics, elastic: bool | None) -> tuple[float, float]:
-    """What a contact block has to hold: the force on it, or that of its bond at time t."""
+    """What a contact block has to hold: the force on it, or that of its bond at time t of the slider."""
     copied_into_callers()
     if elastic is None:
         return p.f_x[i], p.f_y[i]
@@ -284,7 +290,7 @@ def load_on(i: int, t: float, p: Planes, c: Numerics, elastic: bool | None) -> t
 
 @inner
 def load_rate(i: int, p: Planes, c: Numerics, elastic: bool | None) -> tuple[float, float]:
-    """N/s by which what a contact block has to hold grows while nothing moves beyond the quasi-static motion."""
+    """N/s by which that grows with the time of the slider while nothing moves beyond the quasi-static motion."""
     copied_into_callers()
     if elastic is None:
         return p.pull_x[i], p.pull_y[i]
@@ -327,7 +333,7 @@ def slipping(strip: int, s: State, p: Planes, c: Numerics) -> int:
     reach = 0
     for i in range(first, first + LANES):
         hold = static_threshold(p.hold[i], t - p.since[i], c.law)
-        f_x, f_y = load_on(i, t, p, c, c.elastic)
+        f_x, f_y = load_on(i, slider_time(t, c.machine), p, c, c.elastic)
         if p.kind[i] != CONTACT or f_x * f_x + f_y * f_y <= hold * hold:
             continue
         y, x = divmod(i - p.first, p.width)
@@ -501,6 +507,84 @@ def admit_due(step: int, lists: Lists) -> None:
 
 
 @inner
+def await_failures(s: State, a: Active, c: Numerics, machine: FloatArray | None) -> None:
+    """Put strips that fell asleep into the queue; where the slider moves by itself, they listen instead."""
+    lists = a.lists
+    if lists.members[PENDING] == 0:
+        return
+    if machine is None:
+        queue_pending(s, a, c)
+        return
+    for m in range(lists.members[PENDING]):
+        join(lists.strips[PENDING, m], LISTENING, lists)
+    lists.members[PENDING] = 0
+
+
+@inner
+def jump(until_step: int, s: State, a: Active, out: Samples, c: Numerics, machine: FloatArray | None) -> bool:
+    """Skip the steps to the next failure in the queue where nothing moves; whether there were any."""
+    lists = a.lists
+    if machine is not None or listed(GLIDING, lists) > 0:
+        return False
+    wait = steps_to_next_failure(s.counts[STEP], until_step - s.counts[STEP], lists.head)
+    if wait > 0:
+        observe(wait, 0, s, out, c)
+    return wait > 0
+
+
+@inner
+def slack(a: Active, c: Numerics, t: float, machine: FloatArray) -> tuple[float, float]:
+    """Times of the slider between which every block holds, their forces being known; |F + R (s - now)| < F_s."""
+    copied_into_callers()
+    p, now = a.planes, machine[SLIDER]
+    back, ahead = -np.inf, np.inf
+    for strip in range(len(p.place)):
+        for i in range(p.place[strip], p.place[strip] + LANES):
+            if p.kind[i] != CONTACT:
+                continue
+            limit = static_threshold(p.hold[i], t - p.since[i], c.law)
+            r_x, r_y = load_rate(i, p, c, c.elastic)
+            f_x, f_y = load_on(i, now, p, c, c.elastic)
+            square = r_x * r_x + r_y * r_y
+            b = f_x * r_x + f_y * r_y
+            root = math.sqrt(max(b * b - square * (f_x * f_x + f_y * f_y - limit * limit), 0.0))
+            if square > 0.0:
+                back = max(back, (-root - b) / square)
+                ahead = min(ahead, (root - b) / square)
+    return now + back, now + ahead
+
+
+@inner
+def drift(until_step: int, s: State, a: Active, out: Samples, c: Numerics, machine: FloatArray | None) -> bool:
+    """Where nothing moves, move the slider alone until a block might; at least by a step. Whether nothing moved."""
+    if machine is None or listed(GLIDING, a.lists) > 0:
+        return False
+    calm = machine[CARRIED] * abs(drag_rate(c.damping, machine)) < 0.5 * c.rest_force
+    back, ahead = slack(a, c, c.start + s.counts[STEP] * c.dt, machine) if calm else (0.0, 0.0)
+    while True:
+        move_slider(c.dt, machine)
+        observe(1, 0, s, out, c)
+        if s.counts[STEP] >= until_step or s.counts[CODE] != RUNNING or not back < machine[SLIDER] < ahead:
+            return True
+        accelerate_slider(c.start + s.counts[STEP] * c.dt, s.totals[ALONG], c, machine)
+        if machine[CARRIED] * abs(drag_rate(c.damping, machine)) >= 0.5 * c.rest_force:
+            return True
+
+
+@inner
+def moved_along(along: float, way: float, a: Active, c: Numerics, pulled: IntArray | None) -> float:
+    """Displacement along the pull beyond the quasi-static one, summed over the blocks that the slider pulls."""
+    if pulled is None:
+        return along + way * total(a.sums.along)
+    found, p = 0.0, a.planes
+    for block in pulled:
+        y, x = divmod(block, c.nx)
+        i = p.first + y * p.width + x
+        found += p.q_x[i] * c.direction_x + p.q_y[i] * c.direction_y
+    return found
+
+
+@inner
 def total(values: FloatArray) -> float:
     """The sum over all shares and lanes."""
     found = 0.0
@@ -519,15 +603,14 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
     friction = s.totals[FRICTION_WORK] - way * total(a.sums.work)
     viscous = s.totals[VISCOUS_WORK] - way * c.damping * c.dt * total(a.sums.squares)
     while s.counts[STEP] < until_step and s.counts[CODE] == RUNNING:
-        if lists.members[PENDING] > 0:
-            queue_pending(s, a, c)
-        if listed(GLIDING, lists) == 0:
-            wait = steps_to_next_failure(s.counts[STEP], until_step - s.counts[STEP], lists.head)
-            if wait > 0:
-                observe(wait, 0, s, out, c)
-                continue
+        await_failures(s, a, c, c.machine)
+        if jump(until_step, s, a, out, c, c.machine):
+            continue
         admit_due(s.counts[STEP], lists)
+        accelerate_slider(c.start + s.counts[STEP] * c.dt, s.totals[ALONG], c, c.machine)
         start_all(s, a, c)
+        if drift(until_step, s, a, out, c, c.machine):
+            continue
         active = listed(GLIDING, lists)
         s.counts[ACTIVE_STEPS] += LANES * active
         threads = threads_for(active, a.orders)
@@ -545,7 +628,8 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
                 for strip in lists.strips[row, : lists.members[row]]:
                     moving += a.moving[strip]
         rest_all(a, c)
-        s.totals[ALONG] = along + way * total(a.sums.along)
+        s.totals[ALONG] = moved_along(along, way, a, c, c.pulled)
+        move_slider(c.dt, c.machine)
         observe(1, moving, s, out, c)
     s.totals[FRICTION_WORK] = friction + way * total(a.sums.work)
     s.totals[VISCOUS_WORK] = viscous + way * c.damping * c.dt * total(a.sums.squares)

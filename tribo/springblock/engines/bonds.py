@@ -19,8 +19,16 @@ from numpy.typing import NDArray
 
 from tribo.records import FloatArray
 from tribo.springblock.engines.jit import copied_into_callers, inner, inner_vectorised, widest_vectors
-from tribo.springblock.engines.state import Numerics, sliding_threshold, static_threshold
-from tribo.springblock.engines.strips import CONTACT, LANES, NOTHING, BoolArray, IntArray, Planes, Sums
+from tribo.springblock.engines.state import (
+    Numerics,
+    drag_rate,
+    pace_after,
+    pace_before,
+    slider_time,
+    sliding_threshold,
+    static_threshold,
+)
+from tribo.springblock.engines.strips import CONTACT, LANES, NOTHING, BoolArray, IntArray, Planes, Sums, carried
 from tribo.springblock.lattice import INNER
 
 BELOW = 1.0 - 1e-12  # a bond that begins at its threshold does not yield by rounding
@@ -39,8 +47,8 @@ def bound_forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t:
     copied_into_callers()
     one, width = np.uint64(1), np.uint64(p.width)
     quarter = 0.25 * c.stiffness
-    own = 4.0 * INNER[0] + 4.0 * c.shear_stiffness / c.stiffness
-    elapsed, drag = t * c.dt / c.mass, c.damping * c.dt
+    own = 4.0 * INNER[0] + 4.0 * c.inner_shear / c.stiffness
+    elapsed, drag = slider_time(t, c.machine) * c.dt / c.mass, drag_rate(c.damping, c.machine) * c.dt
     for m in range(len(strips)):
         first = np.uint64(p.place[strips[m]])
         edge = p.edge[strips[m]]
@@ -100,7 +108,7 @@ def bound_glides(p: Planes, strips: IntArray, calm: BoolArray, c: Numerics, sums
             p.q_sum[i] = x + y
             p.q_gap[i] = x - y
             sums.along[lane] += a * c.direction_x + b * c.direction_y
-            sums.squares[lane] += squares
+            sums.squares[lane] += squares + carried(a, b, p.frame_x[i], p.frame_y[i], c.dt, c.machine)
         if calm[strips[m]] == loud:
             calm[strips[m]] = not loud
 
@@ -117,7 +125,8 @@ def bound_slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, ste
     t = c.start + step * c.dt
     keep = 1.0 - c.damping * c.dt
     way = c.dt * c.dt / c.mass
-    elapsed = t * c.dt / c.mass
+    elapsed = slider_time(t, c.machine) * c.dt / c.mass
+    earlier, later = pace_before(c.machine), pace_after(c.dt, c.machine)
     for m in range(len(strips)):
         first = np.uint64(p.place[strips[m]])
         on_the_way = 0
@@ -134,8 +143,8 @@ def bound_slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, ste
             released = part if yields else 0.0
             a = keep * p.p_x[i] + p.f_x[i] + released * b_x
             b = keep * p.p_y[i] + p.f_y[i] + released * b_y
-            whole_x, whole_y = a + w_x, b + w_y
-            before_x, before_y = p.p_x[i] + w_x, p.p_y[i] + w_y
+            whole_x, whole_y = a + later * w_x, b + later * w_y
+            before_x, before_y = p.p_x[i] + earlier * w_x, p.p_y[i] + earlier * w_y
             was = math.sqrt(before_x * before_x + before_y * before_y)
             drive = math.sqrt(whole_x * whole_x + whole_y * whole_y)
             sliding = sliding_threshold(p.sliding[i], c.dt / c.mass * was, c.law)
@@ -163,7 +172,7 @@ def bound_slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, ste
             p.p_x[i] = a
             p.p_y[i] = b
             sums.along[lane] += a * c.direction_x + b * c.direction_y
-            sums.squares[lane] += a * a + b * b
+            sums.squares[lane] += a * a + b * b + carried(a, b, w_x, w_y, c.dt, c.machine)
             lost = 0.5 * (b_x * b_x + b_y * b_y - sliding * sliding) / ((p.bond[i] if rubs else 1.0) * way)
             sums.work[lane] += length * sliding + (lost if yields else 0.0)
             slides = rubs & (not stops)

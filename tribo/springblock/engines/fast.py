@@ -13,7 +13,19 @@ from tribo.springblock.engines import state as k
 from tribo.springblock.engines.active import Active, active_of, advance, assist
 from tribo.springblock.engines.bonds import energy_of_bonds
 from tribo.springblock.engines.jit import uncollected
-from tribo.springblock.engines.state import SliderDrive, Thresholds, Trajectory, drive_of, first_failure_s, once, packed
+from tribo.springblock.engines.state import (
+    SliderDrive,
+    Thresholds,
+    Trajectory,
+    drive_of,
+    first_failure_s,
+    force_at,
+    longest_rise_s,
+    machine_of,
+    once,
+    packed,
+    time_of,
+)
 from tribo.springblock.engines.strips import places_of, planes_of
 from tribo.springblock.engines.team import helped
 from tribo.springblock.lattice import Lattice
@@ -34,29 +46,32 @@ def integrate(config: SimConfig, lattice: Lattice, thresholds: Thresholds, threa
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
     state, numerics = at_rest(config, lattice, thresholds, drive, failure - 1.5 * config.dt_s)
     active = active_set(state, numerics, lattice, drive, config, threads)
+    longest = longest_rise_s(config, lattice, thresholds, drive)
     kept: list[k.Samples] = []
     with uncollected(advance), helped(active.orders, lambda thread: assist(active, state, numerics, thread)):
-        for samples, step in in_chunks(config, thresholds, state, numerics, kept):
+        for samples, step in in_chunks(config, longest, state, numerics, kept):
             advance(active, state, samples, numerics, step)
     put_back(active, state, numerics)
+    if numerics.machine is not None:
+        failure = numerics.start + 1.5 * config.dt_s / drive.pace
     trajectory = trajectory_of(kept, state, numerics, drive, failure)
     if lattice.bond is None:
         return trajectory
     inside = places_of(active.planes.first, active.planes.width, numerics.nx, numerics.ny)
-    elapsed = trajectory.end_s * numerics.dt / numerics.mass
+    elapsed = k.slider_time(trajectory.end_s, numerics.machine) * numerics.dt / numerics.mass
     return replace(trajectory, bond_energy_J=energy_of_bonds(active.planes, inside, elapsed))
 
 
 def in_chunks(
-    config: SimConfig, thresholds: Thresholds, state: k.State, numerics: k.Numerics, kept: list[k.Samples]
+    config: SimConfig, longest_rise: float, state: k.State, numerics: k.Numerics, kept: list[k.Samples]
 ) -> Iterator[tuple[k.Samples, int]]:
     """Room for samples and the step to integrate to, until the run has ended; what was sampled goes to ``kept``.
 
-    Without a given duration the run ends at a bound that no peak can pass, or where the loop finds its end.
+    Without a given duration the run ends where the loop finds its end, or long after the longest rise in s.
     """
     end = config.duration_s
     if end is None:
-        end = 2.0 * config.duration_peaks * float(thresholds.static_N.sum()) / numerics.force_rate
+        end = 2.0 * config.duration_peaks * longest_rise
     until = max(1, int(np.ceil((end - numerics.start) / config.dt_s)))
     while state.counts[k.CODE] == k.RUNNING and state.counts[k.STEP] < until:
         time, force, impulse = (np.zeros(_CHUNK + 1) for _ in range(3))
@@ -74,7 +89,7 @@ def active_set(
     state: k.State, numerics: k.Numerics, lattice: Lattice, drive: SliderDrive, config: SimConfig, threads: int = 1
 ) -> Active:
     """What the compiled loop of the fast engine works on."""
-    drag = -config.mass_kg * config.damping_per_s * drive.follow
+    drag = -config.mass_kg * (config.damping_per_s if numerics.machine is None else 1.0) * drive.follow
     pull = np.where(lattice.contact[:, None], drive.rate, drag)
     return active_of(planes_of(state, numerics, lattice, pull, drive.follow), numerics, threads)
 
@@ -92,20 +107,23 @@ def put_back(active: Active, state: k.State, numerics: k.Numerics) -> None:
 def at_rest(
     config: SimConfig, lattice: Lattice, thresholds: Thresholds, drive: SliderDrive, start_s: float
 ) -> tuple[k.State, k.Numerics]:
-    """Everything at rest shortly before the first failure, and the constants of the run.
+    """Everything at rest at a time of the slider shortly before the first failure, and the constants of the run.
 
     Engines start half a step off, so that no rounding decides in which step the first block fails.
     """
     direction = drive.velocity / config.speed_m_s
+    machine, force = machine_of(config, drive, start_s), force_at(config, lattice, drive, start_s)
+    start_time = time_of(machine, start_s, force)
     numerics = k.Numerics(
         nx=lattice.nx,
         ny=lattice.ny,
         periodic=lattice.periodic,
         spacing=config.spacing_m if config.rotation == "finite" else 0.0,
-        start=start_s,
+        start=start_time,
         dt=config.dt_s,
         stiffness=config.stiffness_N_m,
         shear_stiffness=config.shear_stiffness_N_m,
+        inner_shear=config.shear_stiffness_N_m if lattice.pulled is None else 0.0,
         mass=config.mass_kg,
         damping=config.damping_per_s,
         speed=config.speed_m_s,
@@ -118,6 +136,8 @@ def at_rest(
         peak_drop=config.peak_drop,
         law=packed(config.terms),
         elastic=None if lattice.bond is None else True,
+        machine=machine,
+        pulled=lattice.pulled,
     )
     n = lattice.contact.size
     cells = np.zeros((n, k.WIDTH))
@@ -131,9 +151,9 @@ def at_rest(
         counts=np.zeros(k.N_COUNTS, np.int64),
         totals=np.zeros(k.N_TOTALS),
     )
-    along = float((drive.lag @ drive.velocity).sum() / config.speed_m_s)
-    state.totals[k.ALONG] = along
-    state.totals[k.FORCE] = drive.force_rate * numerics.start - config.shear_stiffness_N_m * along
+    pulls = slice(None) if lattice.pulled is None else lattice.pulled
+    state.totals[k.ALONG] = float((drive.lag[pulls] @ drive.velocity).sum() / config.speed_m_s)
+    state.totals[k.FORCE] = force
     state.totals[k.PEAK] = state.totals[k.FORCE]
     state.totals[k.PEAK_TIME] = numerics.start
     state.totals[k.INTEGRAL] = 0.5 * state.totals[k.FORCE] * numerics.start
@@ -178,7 +198,8 @@ def trajectory_of(
     totals = state.totals
     start = (0.0, numerics.start)
     now = numerics.start + int(state.counts[k.STEP]) * numerics.dt
-    at_start = numerics.force_rate * numerics.start
+    machine, slider_s = numerics.machine, k.slider_time(now, numerics.machine)
+    at_start = numerics.force_rate * (numerics.start if machine is None else float(machine[k.BEGAN]))
     found = totals[k.FIRST_FOUND] > 0
     blocks, steps = state.failed[:, : state.counts[k.N_FAILED]]
     return Trajectory(
@@ -194,10 +215,13 @@ def trajectory_of(
         failed=once(blocks[np.lexsort((blocks, steps))]),
         end_s=now,
         end_impulse_Ns=float(totals[k.INTEGRAL]),
-        displacement_m=state.cells[:, k.QX : k.QY + 1] + drive.follow * now,
-        velocity_m_s=state.cells[:, k.VX : k.VY + 1] + drive.follow,
+        displacement_m=state.cells[:, k.QX : k.QY + 1] + drive.follow * slider_s,
+        velocity_m_s=state.cells[:, k.VX : k.VY + 1] + drive.follow * k.pace_before(machine),
         friction_work_J=float(totals[k.FRICTION_WORK]),
         viscous_work_J=float(totals[k.VISCOUS_WORK]),
         dense_steps=int(state.counts[k.DENSE_STEPS]),
         active_block_steps=int(state.counts[k.ACTIVE_STEPS]),
+        slider_m=slider_s * numerics.speed,
+        slider_m_s=k.pace_before(machine) * numerics.speed,
+        damper_work_J=0.0 if machine is None else float(machine[k.LOSS]),
     )

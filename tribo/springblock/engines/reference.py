@@ -30,7 +30,24 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
 from tribo.springblock.engines.jit import compiled
-from tribo.springblock.engines.state import Samples, Thresholds, Trajectory, drive_of, first_failure_s, once
+from tribo.springblock.engines.state import (
+    DAMPER,
+    INERTIA,
+    LOSS,
+    PACE,
+    SLIDER,
+    SPEED,
+    SPRING,
+    Samples,
+    Thresholds,
+    Trajectory,
+    drive_of,
+    first_failure_s,
+    longest_rise_s,
+    machine_of,
+    once,
+    time_of,
+)
 from tribo.springblock.lattice import NEIGHBOURHOOD, NEIGHBOURS, Lattice
 
 START_SHARE = 0.98  # of the first failure
@@ -45,7 +62,7 @@ class Model(NamedTuple):
     static: FloatArray  # (n,) lowered to ``again`` when a block slips
     sliding: FloatArray
     contact: NDArray[np.bool_]
-    shear_stiffness: float
+    shear: FloatArray  # (n,) stiffness of the spring between each block and the slider
     mass: float
     damping: float
     velocity: FloatArray  # (2,) of the slider
@@ -60,6 +77,7 @@ class Model(NamedTuple):
     start: float  # s
     dt: float
     stride: int  # steps from one sample to the next
+    machine: FloatArray  # places as in engines.state; empty where the slider is not on a machine
     stop_at_peaks: float  # the run ends once the time exceeds so many peak times
     u: FloatArray  # (n, 2) displacement
     v: FloatArray  # (n, 2) velocity
@@ -78,10 +96,10 @@ FORCE, IMPULSE, PEAK, PEAK_TIME, FRICTION_WORK, VISCOUS_WORK, N_FAILED, N_SUMS =
 
 @compiled
 def driving_force(u: FloatArray, t: float, m: Model, out: FloatArray) -> None:
-    """F_mot = F_int + F_s of every block, from displacements ``u`` (n, 2) at time ``t``."""
+    """F_mot = F_int + F_s of every block, from displacements ``u`` (n, 2) at time ``t`` of the slider."""
     for i in range(len(u)):
-        fx = m.shear_stiffness * (m.velocity[0] * t - u[i, 0])
-        fy = m.shear_stiffness * (m.velocity[1] * t - u[i, 1])
+        fx = m.shear[i] * (m.velocity[0] * t - u[i, 0])
+        fy = m.shear[i] * (m.velocity[1] * t - u[i, 1])
         for k in range(NEIGHBOURS):
             j = m.neighbours[i, k]
             if j == len(u):
@@ -134,7 +152,7 @@ def acceleration(
 def decide_friction(m: Model, t: float, friction: FloatArray) -> None:
     """Release blocks beyond their static threshold, and set the friction force of this step on those that slide."""
     u, v, resting = m.u, m.v, m.resting
-    driving_force(u, t, m, friction)
+    driving_force(u, m.machine[SLIDER] if len(m.machine) > 0 else t, m, friction)
     for i in range(len(u)):
         driving = math.sqrt(friction[i, 0] * friction[i, 0] + friction[i, 1] * friction[i, 1])
         held = driving
@@ -156,6 +174,25 @@ def decide_friction(m: Model, t: float, friction: FloatArray) -> None:
 
 
 @compiled
+def slider_force(u: FloatArray, t: float, m: Model) -> float:
+    """Force of the slider on the blocks along the pull, at time ``t`` of the slider."""
+    force_x = 0.0
+    force_y = 0.0
+    for i in range(len(u)):
+        force_x += m.shear[i] * (m.velocity[0] * t - u[i, 0])
+        force_y += m.shear[i] * (m.velocity[1] * t - u[i, 1])
+    speed = math.sqrt(m.velocity[0] * m.velocity[0] + m.velocity[1] * m.velocity[1])
+    return (force_x * m.velocity[0] + force_y * m.velocity[1]) / speed
+
+
+@compiled
+def gain_of_pace(u: FloatArray, t: float, slider: float, pace: float, m: Model) -> float:
+    """Acceleration of the slider over the speed of the drive; ``slider`` is its time and ``pace`` its rate."""
+    drive = m.machine[SPRING] * (t - slider) + m.machine[DAMPER] * (1.0 - pace)
+    return (drive - slider_force(u, slider, m)) / m.machine[INERTIA]
+
+
+@compiled
 def shifted(base: FloatArray, slope: FloatArray, h: float, out: FloatArray) -> None:
     for i in range(len(base)):
         out[i, 0] = base[i, 0] + h * slope[i, 0]
@@ -166,21 +203,40 @@ def shifted(base: FloatArray, slope: FloatArray, h: float, out: FloatArray) -> N
 def runge_kutta(
     u: FloatArray, v: FloatArray, t: float, dt: float, resting: NDArray[np.bool_], m: Model, w: FloatArray
 ) -> None:
-    """One classical fourth-order step of u' = v, v' = a.
+    """One classical fourth-order step of u' = v, v' = a, and of the slider on its machine.
 
     ``w`` is work space (10, n, 2): ``w[9]`` holds the friction of the step, ``w[8]`` receives the new velocity.
     """
     a1, a2, a3, a4, v2, v3, v4, p, new_v = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8]
-    acceleration(u, v, t, resting, w[9], m, a1)
+    on_machine = len(m.machine) > 0
+    s1, s2, s3, s4 = t, t + 0.5 * dt, t + 0.5 * dt, t + dt  # time of the slider at each stage
+    d1 = d2 = d3 = d4 = g1 = g2 = g3 = g4 = 0.0
+    if on_machine:
+        s1, d1 = m.machine[SLIDER], m.machine[PACE]
+        g1 = gain_of_pace(u, t, s1, d1, m)
+    acceleration(u, v, s1, resting, w[9], m, a1)
     shifted(v, a1, 0.5 * dt, v2)
     shifted(u, v, 0.5 * dt, p)
-    acceleration(p, v2, t + 0.5 * dt, resting, w[9], m, a2)
+    if on_machine:
+        s2, d2 = s1 + 0.5 * dt * d1, d1 + 0.5 * dt * g1
+        g2 = gain_of_pace(p, t + 0.5 * dt, s2, d2, m)
+    acceleration(p, v2, s2, resting, w[9], m, a2)
     shifted(v, a2, 0.5 * dt, v3)
     shifted(u, v2, 0.5 * dt, p)
-    acceleration(p, v3, t + 0.5 * dt, resting, w[9], m, a3)
+    if on_machine:
+        s3, d3 = s1 + 0.5 * dt * d2, d1 + 0.5 * dt * g2
+        g3 = gain_of_pace(p, t + 0.5 * dt, s3, d3, m)
+    acceleration(p, v3, s3, resting, w[9], m, a3)
     shifted(v, a3, dt, v4)
     shifted(u, v3, dt, p)
-    acceleration(p, v4, t + dt, resting, w[9], m, a4)
+    if on_machine:
+        s4, d4 = s1 + dt * d3, d1 + dt * g3
+        g4 = gain_of_pace(p, t + dt, s4, d4, m)
+        m.machine[SLIDER] += dt / 6.0 * (d1 + 2.0 * d2 + 2.0 * d3 + d4)
+        m.machine[PACE] += dt / 6.0 * (g1 + 2.0 * g2 + 2.0 * g3 + g4)
+        lost = (1.0 - d1) ** 2 + (1.0 - m.machine[PACE]) ** 2
+        m.machine[LOSS] += 0.5 * dt * m.machine[DAMPER] * m.machine[SPEED] * lost
+    acceleration(p, v4, s4, resting, w[9], m, a4)
     for i in range(len(u)):
         for d in range(2):
             new_v[i, d] = v[i, d] + dt / 6.0 * (a1[i, d] + 2.0 * a2[i, d] + 2.0 * a3[i, d] + a4[i, d])
@@ -201,8 +257,6 @@ def comes_to_rest(v: FloatArray, new_v: FloatArray, m: Model) -> bool:
 def finish_step(m: Model, t: float, new_v: FloatArray, tested: bool) -> None:
     """Stop blocks where ``tested``, and add up force, friction work and viscous work of the step."""
     u, v, resting, dt = m.u, m.v, m.resting, m.dt
-    force_x = 0.0
-    force_y = 0.0
     for i in range(len(u)):
         if m.elastic or not resting[i]:
             before = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
@@ -221,10 +275,10 @@ def finish_step(m: Model, t: float, new_v: FloatArray, tested: bool) -> None:
             m.sums[VISCOUS_WORK] += 0.5 * dt * m.mass * m.damping * (before * before + after * after)
             v[i, 0] = new_v[i, 0]
             v[i, 1] = new_v[i, 1]
-        force_x += m.shear_stiffness * (m.velocity[0] * (t + dt) - u[i, 0])
-        force_y += m.shear_stiffness * (m.velocity[1] * (t + dt) - u[i, 1])
-    speed = math.sqrt(m.velocity[0] * m.velocity[0] + m.velocity[1] * m.velocity[1])
-    force = (force_x * m.velocity[0] + force_y * m.velocity[1]) / speed
+    if len(m.machine) > 0:
+        force = m.machine[SPRING] * (t + dt - m.machine[SLIDER]) + m.machine[DAMPER] * (1.0 - m.machine[PACE])
+    else:
+        force = slider_force(u, t + dt, m)
     m.sums[IMPULSE] += 0.5 * dt * (m.sums[FORCE] + force)
     m.sums[FORCE] = force
     if force > m.sums[PEAK]:
@@ -256,13 +310,15 @@ def integrate_all(m: Model, steps: int, w: FloatArray) -> int:
 def reference_model(
     config: SimConfig, lattice: Lattice, thresholds: Thresholds, start_s: float, stride: int, samples: int
 ) -> Model:
-    """A run at its start, all blocks on the quasi-static motion, with room for so many samples."""
+    """A run at its start, at a time of the slider on the quasi-static motion, with room for so many samples."""
     offsets, stiffness = np.split(np.array(NEIGHBOURHOOD), [2], axis=1)
     lengths = np.hypot(*offsets.T)
     drive = drive_of(config, lattice)
     sums = np.zeros(N_SUMS)
+    machine = machine_of(config, drive, start_s)
     sums[FORCE] = drive.force_rate * start_s
-    sums[IMPULSE] = 0.5 * sums[FORCE] * start_s
+    time_s = time_of(machine, start_s, float(sums[FORCE]))
+    sums[IMPULSE] = 0.5 * sums[FORCE] * time_s
     return Model(
         neighbours=lattice.neighbours,
         rest=config.spacing_m * np.column_stack([offsets, lengths]),
@@ -270,7 +326,9 @@ def reference_model(
         static=thresholds.static_N.copy(),
         sliding=thresholds.sliding_N,
         contact=lattice.contact,
-        shear_stiffness=config.shear_stiffness_N_m,
+        shear=config.stiffness_N_m * lattice.slider
+        if lattice.pulled is not None
+        else np.full(lattice.contact.size, config.shear_stiffness_N_m),
         mass=config.mass_kg,
         damping=config.damping_per_s,
         velocity=drive.velocity,
@@ -282,12 +340,13 @@ def reference_model(
         elastic=lattice.bond is not None,
         bond=np.zeros(lattice.contact.size) if lattice.bond is None else config.stiffness_N_m * lattice.bond,
         anchor=np.zeros((lattice.contact.size, 2)),
-        start=start_s,
+        start=time_s,
         dt=config.dt_s,
         stride=stride,
+        machine=np.zeros(0) if machine is None else machine,
         stop_at_peaks=np.inf if config.duration_s else config.duration_peaks,
         u=drive.follow * start_s + drive.lag,
-        v=drive.follow.copy(),
+        v=drive.pace * drive.follow,
         resting=lattice.contact.copy(),
         failed=np.full(64, -1, np.int64),
         out=Samples(np.zeros(samples), np.zeros(samples), np.zeros(samples), np.zeros(samples, np.int64)),
@@ -307,19 +366,22 @@ def integrate(
     """
     drive = drive_of(config, lattice)
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
-    start = start_share * failure
-    end = config.duration_s or 2.0 * config.duration_peaks * float(thresholds.static_N.sum()) / drive.force_rate
+    slider_s = start_share * failure
+    start = slider_s
+    if config.machine_stiffness_N_per_m is not None:
+        start, failure = (time_of(machine_of(config, drive, s), s, drive.force_rate * s) for s in (slider_s, failure))
+    end = config.duration_s or 2.0 * config.duration_peaks * longest_rise_s(config, lattice, thresholds, drive)
     steps = max(1, int(np.ceil((end - start) / config.dt_s)))
     stride = min(max(1, round(config.sample_interval_s / config.dt_s)), steps)
-    run = reference_model(config, lattice, thresholds, start, stride, steps // stride)
+    run = reference_model(config, lattice, thresholds, slider_s, stride, steps // stride)
     kept = integrate_all(run, steps, np.zeros((10, *run.u.shape)))
     out, sums = run.out, run.sums
     if not np.isfinite(sums[FORCE]):
         _refuse(run.u, lattice, float(out.time[kept - 1]))
     return Trajectory(
         time_s=np.concatenate([(0.0, start), out.time[:kept]]),
-        force_N=np.concatenate([(0.0, drive.force_rate * start), out.force[:kept]]),
-        impulse_Ns=np.concatenate([(0.0, 0.5 * drive.force_rate * start**2), out.impulse[:kept]]),
+        force_N=np.concatenate([(0.0, drive.force_rate * slider_s), out.force[:kept]]),
+        impulse_Ns=np.concatenate([(0.0, 0.5 * drive.force_rate * (slider_s * start)), out.impulse[:kept]]),
         moving=np.concatenate([np.zeros(2, np.int64), out.moving[:kept]]),
         peak_N=float(sums[PEAK]),
         peak_s=float(sums[PEAK_TIME]),
@@ -334,6 +396,9 @@ def integrate(
         friction_work_J=float(sums[FRICTION_WORK]),
         viscous_work_J=float(sums[VISCOUS_WORK]),
         bond_energy_J=_bond_energy(run),
+        slider_m=config.speed_m_s * float(run.machine[SLIDER] if run.machine.size else out.time[kept - 1]),
+        slider_m_s=config.speed_m_s * float(run.machine[PACE] if run.machine.size else 1.0),
+        damper_work_J=float(run.machine[LOSS]) if run.machine.size else 0.0,
     )
 
 
@@ -349,7 +414,9 @@ def _refuse(u: FloatArray, lattice: Lattice, t: float) -> None:
     y, x = divmod(int(bad[0]), lattice.nx) if bad.size else (-1, -1)
     raise SimulationError(
         Problem(
-            "not_finite", f"the force is no longer finite at t = {t:.9g} s",
-            found=f"{bad.size} blocks, the first at x = {x}, y = {y}", allowed="a smaller dt_s",
+            "not_finite",
+            f"the force is no longer finite at t = {t:.9g} s",
+            found=f"{bad.size} blocks, the first at x = {x}, y = {y}",
+            allowed="a smaller dt_s",
         )
     )

@@ -72,6 +72,85 @@ def sliding_threshold(base_N: float, speed_m_s: float, law: FloatArray | None) -
     return at_speed(base_N, speed_m_s, law)
 
 
+# the slider on a machine that is not rigid, places in Numerics.machine. Its time is its way over the speed of the
+# drive; PACE, the rate of that time, belongs to the middle of the steps, as velocities do; GAIN is the rate of PACE,
+# CARRIED, the largest momentum of a block that follows at a pace of 1
+SLIDER, PACE, GAIN, SPRING, DAMPER, INERTIA, SPEED, LOSS, BEGAN, CARRIED, N_MACHINE = range(11)
+
+
+@inner
+def slider_time(t: float, machine: FloatArray | None) -> float:
+    """Time of the slider at time t: t itself where the machine is rigid."""
+    if machine is None:
+        return t
+    return machine[SLIDER]
+
+
+@inner
+def drag_rate(damping: float, machine: FloatArray | None) -> float:
+    """Drag and inertia of a block of mass 1 that follows the slider with velocity 1 a unit of its time."""
+    if machine is None:
+        return damping
+    return damping * machine[PACE] + machine[GAIN]
+
+
+@inner
+def drag_weight(damping: float, machine: FloatArray | None) -> float:
+    """What multiplies the drag of a cavity block that follows; that of a rigid machine is the same at all times."""
+    if machine is None:
+        return 1.0
+    return drag_rate(damping, machine)
+
+
+@inner
+def pace_before(machine: FloatArray | None) -> float:
+    """Speed of the slider over that of the drive half a step ago."""
+    if machine is None:
+        return 1.0
+    return machine[PACE]
+
+
+@inner
+def pace_after(dt: float, machine: FloatArray | None) -> float:
+    """The same half a step ahead."""
+    if machine is None:
+        return 1.0
+    return machine[PACE] + machine[GAIN] * dt
+
+
+@inner
+def drive_force(t: float, machine: FloatArray) -> float:
+    """Force of spring and damper between the drive and the slider."""
+    return machine[SPRING] * (t - machine[SLIDER]) + machine[DAMPER] * (1.0 - machine[PACE])
+
+
+@inner
+def force_on_drive(t: float, on_slider: float, machine: FloatArray | None) -> float:
+    """The force that a run records: that of the machine, or where it is rigid that of the slider."""
+    if machine is None:
+        return on_slider
+    return drive_force(t, machine)
+
+
+@inner
+def accelerate_slider(t: float, along: float, c: Numerics, machine: FloatArray | None) -> None:
+    """Find how fast the pace of the slider changes in the step that begins."""
+    if machine is None:
+        return
+    held = c.force_rate * machine[SLIDER] - c.shear_stiffness * along
+    machine[GAIN] = (drive_force(t, machine) - held) / machine[INERTIA]
+
+
+@inner
+def move_slider(dt: float, machine: FloatArray | None) -> None:
+    """Move the slider by a step."""
+    if machine is None:
+        return
+    machine[PACE] += machine[GAIN] * dt
+    machine[SLIDER] += machine[PACE] * dt
+    machine[LOSS] += machine[DAMPER] * machine[SPEED] * (1.0 - machine[PACE]) ** 2 * dt
+
+
 # columns of State.cells: displacement q, velocity beyond w, thresholds (static now, sliding, static after a slip),
 # time of the last stop
 QX, QY, VX, VY, FS, FD, FA, SINCE, WIDTH = range(9)
@@ -112,6 +191,7 @@ class Numerics(NamedTuple):
     dt: float
     stiffness: float  # K_int
     shear_stiffness: float  # K_s
+    inner_shear: float  # K_s on blocks within the lattice: zero where only an edge is pulled
     mass: float
     damping: float  # gamma, 1/s
     speed: float  # of the slider
@@ -124,6 +204,8 @@ class Numerics(NamedTuple):
     peak_drop: float  # the first peak is found once the force has fallen by this share
     law: FloatArray | None  # parameters of the friction terms; None compiles to loops without them
     elastic: bool | None = None  # True where contact is elastic; None compiles to loops of rigid contact
+    machine: FloatArray | None = None  # the slider, which the loops move; None compiles to loops of a rigid machine
+    pulled: NDArray[np.int64] | None = None  # blocks that the slider pulls; None where it pulls all
 
 
 @inner
@@ -133,7 +215,7 @@ def observe(steps: int, moving: int, s: State, out: Samples, c: Numerics) -> Non
     to_step = from_step + steps
     t = c.start + to_step * c.dt
     before = s.totals[FORCE]
-    force = c.force_rate * t - c.shear_stiffness * s.totals[ALONG]
+    force = force_on_drive(t, c.force_rate * t - c.shear_stiffness * s.totals[ALONG], c.machine)
     due = (from_step // c.stride + 1) * c.stride
     while due <= to_step:
         share = (due - from_step) / steps
@@ -175,13 +257,18 @@ class Thresholds:
 
 @dataclass(frozen=True)
 class SliderDrive:
-    """Forces while everything sticks: on block i it is ``rate[i] * t``, the cavities moving at ``follow``."""
+    """Forces while everything sticks: on block i it is ``rate[i] * t``, the cavities moving at ``follow``.
+
+    Here and in the engines t is the time of the slider, its way over the speed of the drive; where the machine is not
+    rigid, the slider moves at the share ``pace`` of that speed while everything sticks, and behind its time.
+    """
 
     velocity: FloatArray  # (2,) of the slider
     follow: FloatArray  # (n, 2) quasi-static velocity of cavity blocks, zero on rigid contact
     rate: FloatArray  # (n, 2) N/s, zero on cavities
     lag: FloatArray  # (n, 2) m, displacement of the blocks that follow under their steady drag
     force_rate: float  # N/s of the slider force along the pull
+    pace: float = 1.0  # speed of the slider over that of the drive
 
 
 @dataclass(frozen=True)
@@ -207,6 +294,9 @@ class Trajectory:
     dense_steps: int = 0
     active_block_steps: int = 0
     bond_energy_J: float = 0.0  # in elastic contacts at the end; sliding blocks stretch theirs by friction
+    slider_m: float = 0.0  # way of the slider at the end
+    slider_m_s: float = 0.0  # and its speed
+    damper_work_J: float = 0.0  # lost in the damper of the machine
 
 
 def lattice_of(config: SimConfig) -> Lattice:
@@ -214,7 +304,7 @@ def lattice_of(config: SimConfig) -> Lattice:
     shear = config.shear_stiffness_N_m / config.stiffness_N_m
     kappa = config.contact_stiffness_Pa_per_m
     bond = None if kappa is None else kappa * config.spacing_m**2 / config.stiffness_N_m
-    return make_lattice(mask_of(config), shear, config.edges == "periodic", bond)
+    return make_lattice(mask_of(config), shear, config.edges == "periodic", bond, config.pulled_side)
 
 
 def thresholds_of(config: SimConfig, lattice: Lattice) -> Thresholds:
@@ -246,13 +336,59 @@ def drive_of(config: SimConfig, lattice: Lattice) -> SliderDrive:
     velocity = config.speed_m_s * direction
     follow = lattice.follow[:-1] @ velocity
     if lattice.bond is None:
-        rate = config.stiffness_N_m * (lattice.spring_forces(follow) + lattice.shear * velocity)
+        rate = config.stiffness_N_m * (lattice.spring_forces(follow) + lattice.slider[:, None] * velocity)
         rate[~lattice.contact] = 0.0
     else:
         rate = config.stiffness_N_m * lattice.bond[:, None] * follow
     lag = -config.mass_kg * config.damping_per_s / config.stiffness_N_m * (lattice.lag[:-1] @ velocity)
-    pulled = lattice.contact.size * config.speed_m_s - float((follow @ direction).sum())
-    return SliderDrive(velocity, follow, rate, lag, config.shear_stiffness_N_m * pulled)
+    pulls = slice(None) if lattice.pulled is None else lattice.pulled
+    followed = follow[pulls]
+    pulled = len(followed) * config.speed_m_s - float((followed @ direction).sum())
+    force_rate = config.shear_stiffness_N_m * pulled
+    if config.machine_stiffness_N_per_m is None:
+        return SliderDrive(velocity, follow, rate, lag, force_rate)
+    machine_rate = config.machine_stiffness_N_per_m * config.speed_m_s
+    pace = machine_rate / (machine_rate + force_rate)
+    return SliderDrive(velocity, follow, rate, pace * lag, force_rate, pace)
+
+
+def force_at(config: SimConfig, lattice: Lattice, drive: SliderDrive, slider_s: float) -> float:
+    """Force of the slider while everything sticks, at a time of the slider."""
+    pulls = slice(None) if lattice.pulled is None else lattice.pulled
+    along = float((drive.lag[pulls] @ drive.velocity).sum() / config.speed_m_s)
+    return drive.force_rate * slider_s - config.shear_stiffness_N_m * along
+
+
+def machine_of(config: SimConfig, drive: SliderDrive, slider_s: float) -> FloatArray | None:
+    """The slider on its machine as the loops take it, while everything sticks; None where the machine is rigid."""
+    if config.machine_stiffness_N_per_m is None:
+        return None
+    machine = np.zeros(N_MACHINE)
+    machine[SLIDER] = machine[BEGAN] = slider_s
+    machine[CARRIED] = config.mass_kg * float(np.hypot(*drive.follow.T).max())
+    machine[PACE], machine[SPEED] = drive.pace, config.speed_m_s
+    machine[SPRING] = config.machine_stiffness_N_per_m * config.speed_m_s
+    machine[DAMPER] = (config.machine_damping_N_s_per_m or 0.0) * config.speed_m_s
+    machine[INERTIA] = config.moved_mass_kg * config.speed_m_s
+    return machine
+
+
+def time_of(machine: FloatArray | None, slider_s: float, force_N: float) -> float:
+    """Time at which the slider is where its own time is ``slider_s``, while everything sticks."""
+    if machine is None:
+        return slider_s
+    return float(slider_s + (force_N - machine[DAMPER] * (1.0 - machine[PACE])) / machine[SPRING])
+
+
+def longest_rise_s(config: SimConfig, lattice: Lattice, thresholds: Thresholds, drive: SliderDrive) -> float:
+    """A time within which the force has reached all that the blocks can hold together."""
+    compliance = 1.0 / drive.force_rate
+    if lattice.pulled is not None:
+        across, along = len(lattice.pulled), lattice.contact.size // len(lattice.pulled)
+        compliance += along / (config.stiffness_N_m * across * config.speed_m_s)
+    if config.machine_stiffness_N_per_m is not None:
+        compliance += 1.0 / (config.machine_stiffness_N_per_m * config.speed_m_s)
+    return float(thresholds.static_N.sum()) * compliance
 
 
 def first_failure_s(lattice: Lattice, thresholds: Thresholds, drive: SliderDrive, stiffness_N_m: float) -> float:

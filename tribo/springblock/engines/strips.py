@@ -21,7 +21,15 @@ from numpy.typing import NDArray
 from tribo.records import FloatArray
 from tribo.springblock.engines import state as k
 from tribo.springblock.engines.jit import copied_into_callers, inner, inner_vectorised, widest_vectors
-from tribo.springblock.engines.state import Numerics, State, sliding_threshold, static_threshold
+from tribo.springblock.engines.state import (
+    Numerics,
+    State,
+    drag_weight,
+    pace_after,
+    slider_time,
+    sliding_threshold,
+    static_threshold,
+)
 from tribo.springblock.lattice import INNER, Lattice
 
 LINE = 8  # numbers in a cache line
@@ -54,7 +62,8 @@ def places_of(first: int, width: int, nx: int, ny: int) -> NDArray[np.int64]:
 
 def spare_stiffness(lattice: Lattice) -> FloatArray:
     """Own stiffness (xx, yy, xy) per K_int that each block lacks against an inner one; (n, 3), zero inside."""
-    spare = np.add(INNER, (lattice.shear, lattice.shear, 0.0)) - lattice.own[:-1]
+    inner_shear = lattice.shear if lattice.pulled is None else 0.0
+    spare = np.add(INNER, (inner_shear, inner_shear, 0.0)) - lattice.own[:-1]
     spare[np.abs(spare).max(axis=1) <= 1e-9] = 0.0
     return spare
 
@@ -125,13 +134,14 @@ def planes_of(
 ) -> Planes:
     """The blocks of a state as the loops take them.
 
-    ``pull`` (n, 2): N/s on contact blocks, N on cavity blocks; ``follow`` (n, 2), their quasi-static velocity, stands
-    in its place where contact is elastic.
+    ``pull`` (n, 2): N/s on contact blocks, N on cavity blocks (N s where the machine is not rigid); ``follow`` (n, 2),
+    their quasi-static velocity, stands in its place where contact is elastic.
     """
     nx, ny = lattice.nx, lattice.ny
     bound = lattice.bond is not None
-    first, width, planes = interleaved(nx, ny, 22 if bound else 16)
-    planes += [] if bound else [np.zeros(0)] * 6
+    framed = bound or numerics.machine is not None
+    first, width, planes = interleaved(nx, ny, 22 if framed else 16)
+    planes += [] if framed else [np.zeros(0)] * 6
     inside = places_of(first, width, nx, ny)
     cells, contact = state.cells, lattice.contact
     q_x, q_y, q_sum, q_gap, p_x, p_y, _, _, pull_x, pull_y, kind, hold, again, sliding, pace, since = planes[:16]
@@ -153,10 +163,11 @@ def planes_of(
     hold[inside] = np.where(moves, np.inf, np.where(contact, cells[:, k.FS], 2.0 * numerics.rest_force))
     again[inside], sliding[inside] = cells[:, k.FA], cells[:, k.FD]
     since[inside] = np.where(contact, cells[:, k.SINCE], np.inf)
-    if lattice.bond is not None and follow is not None:
-        bond, _, _, frame_x, frame_y, wake = planes[16:]
-        bond[inside] = numerics.stiffness * lattice.bond
+    bond, _, _, frame_x, frame_y, wake = planes[16:]
+    if framed and follow is not None:
         frame_x[inside], frame_y[inside] = follow.T * (numerics.mass / numerics.dt)
+    if lattice.bond is not None:
+        bond[inside] = numerics.stiffness * lattice.bond
         wake[lanes] = hold[lanes]
         wake[inside] = 2.0 * numerics.rest_force
         hold[inside[~contact]] = np.inf
@@ -185,7 +196,8 @@ def forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t: float
     copied_into_callers()
     one, width = np.uint64(1), np.uint64(p.width)
     quarter = 0.25 * c.stiffness
-    own = 4.0 * INNER[0] + 4.0 * c.shear_stiffness / c.stiffness
+    own = 4.0 * INNER[0] + 4.0 * c.inner_shear / c.stiffness
+    load, drag = slider_time(t, c.machine), drag_weight(c.damping, c.machine)
     for m in range(len(strips)):
         first = np.uint64(p.place[strips[m]])  # unsigned, so that no index counts from the end
         beyond = False
@@ -196,7 +208,7 @@ def forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t: float
             falling = p.q_gap[down - one] + p.q_gap[up + one]
             bent_x = 4.0 * (p.q_x[i + one] + p.q_x[i - one]) + rising + falling - own * p.q_x[i]
             bent_y = 4.0 * (p.q_y[up] + p.q_y[down]) + rising - falling - own * p.q_y[i]
-            weight = t if p.kind[i] == CONTACT else 1.0
+            weight = load if p.kind[i] == CONTACT else drag
             f_x = quarter * bent_x + weight * p.pull_x[i]
             f_y = quarter * bent_y + weight * p.pull_y[i]
             p.f_x[i] = f_x
@@ -216,6 +228,23 @@ def forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t: float
                 beyond |= f_x * f_x + f_y * f_y > hold * hold
         if beyond:  # written only where it changes: other threads use what lies beside it
             starts[strips[m]] = True
+
+
+@inner
+def carried(a: float, b: float, w_x: float, w_y: float, dt: float, machine: FloatArray | None) -> float:
+    """What the quasi-static motion adds to the square of m v / dt; left out where the slider is never fast."""
+    if machine is None:
+        return 0.0
+    pace = pace_after(dt, machine)
+    return pace * (2.0 * (a * w_x + b * w_y) + pace * (w_x * w_x + w_y * w_y))
+
+
+@inner
+def frame_of(frame: FloatArray, i: Any, machine: FloatArray | None) -> float:
+    """m w / dt of a block, where it is kept."""
+    if machine is None:
+        return 0.0
+    return frame[i]
 
 
 @inner_vectorised
@@ -247,7 +276,8 @@ def glides(p: Planes, strips: IntArray, calm: BoolArray, c: Numerics, sums: Sums
             p.q_sum[i] = x + y
             p.q_gap[i] = x - y
             sums.along[lane] += a * c.direction_x + b * c.direction_y
-            sums.squares[lane] += squares
+            w_x, w_y = frame_of(p.frame_x, i, c.machine), frame_of(p.frame_y, i, c.machine)
+            sums.squares[lane] += squares + carried(a, b, w_x, w_y, c.dt, c.machine)
         if calm[strips[m]] == loud:
             calm[strips[m]] = not loud
 
@@ -297,7 +327,8 @@ def slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, step: int
             p.q_sum[i] = x + y
             p.q_gap[i] = x - y
             sums.along[lane] += a * c.direction_x + b * c.direction_y
-            sums.squares[lane] += length * length
+            w_x, w_y = frame_of(p.frame_x, i, c.machine), frame_of(p.frame_y, i, c.machine)
+            sums.squares[lane] += length * length + carried(a, b, w_x, w_y, c.dt, c.machine)
             sums.work[lane] += length * sliding
             p.p_x[i] = 0.0 if stops else a
             p.p_y[i] = 0.0 if stops else b
