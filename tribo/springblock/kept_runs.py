@@ -34,8 +34,7 @@ ONE_RUN = "one run of the spring-block model"
 ENSEMBLE = "an ensemble of the spring-block model"
 UNITS = {
     "s": "s", "m": "m", "Pa": "Pa", "N": "N", "deg": "degree", "N_m": "N/m", "kg_m3": "kg/m3", "per_s": "1/s",
-    "m_s": "m/s", "kg": "kg", "N_per_m": "N/m", "N_s_per_m": "N s/m", "Hz": "Hz", "m2": "m2", "Pa_per_m": "Pa/m", "N_per_m": "N/m",
-    "N_s_per_m": "N s/m", "kg": "kg",
+    "m_s": "m/s", "kg": "kg", "N_per_m": "N/m", "N_s_per_m": "N s/m", "Hz": "Hz", "m2": "m2", "Pa_per_m": "Pa/m",
 }  # fmt: skip
 Column = tuple[Any, Mapping[str, str]]  # values along the dimension, attributes
 _LONGEST_FIRST = sorted(UNITS, key=len, reverse=True)
