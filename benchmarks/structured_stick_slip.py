@@ -13,6 +13,7 @@ out. What the file holds already is not computed again.
 from __future__ import annotations
 
 import math
+import os
 import sys
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from tribo.records import Pattern
 from tribo.springblock import SimConfig, simulate
 
 ROOT3 = math.sqrt(3.0)
-SEEDS = 4
+SEEDS = int(os.environ.get("SEEDS", "4"))
 
 
 def hexagonal(name: str, feature: str, diameter_um: float, pitch_um: float) -> Pattern:
