@@ -10,7 +10,7 @@ from on_the_command_line import run
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.drafting.file_names import columns_in_name, not_used, proposed_patterns, where_it_stops
+from tribo.drafting.file_names import columns_in_name, not_used, proposed_patterns, radii_in_name, where_it_stops
 
 from .test_draft import pull, raw_folder, rows_of
 
@@ -67,9 +67,7 @@ def test_a_speed_with_its_unit_is_one_in_turns_or_on_a_path() -> None:
         ("A_3N_1", "{sample}_{normal_load_N}N", 'goes on with "_1" from character 5'),
     ],
 )
-def test_a_pattern_that_fits_no_file_says_where_it_stopped(
-    tmp_path: Path, name: str, pattern: str, said: str
-) -> None:
+def test_a_pattern_that_fits_no_file_says_where_it_stopped(tmp_path: Path, name: str, pattern: str, said: str) -> None:
     assert said in where_it_stops(name, pattern)
     done = run("init", tmp_path / "c", "--from", folder_of(tmp_path, name), "--names", pattern)
     assert done.exit_code == 1
@@ -229,3 +227,26 @@ def test_a_force_of_both_signs_is_asked_about_and_the_zero_that_is_stated_settle
     filled_in(tmp_path / "c", "zero", '"before contact"')
     (read,) = stages.ingest(load_campaign(tmp_path / "c")).pulls.values()
     assert read.sliding_N == pytest.approx(2.0, rel=0.01)
+
+
+def test_a_radius_in_the_name_of_a_file_is_that_of_its_tables() -> None:
+    turns = [477.5 / 60, 238.7 / 60, 119.2 / 60, 47.71 / 60]
+    name = LONG.format("014", "316SS", 3)
+    assert radii_in_name(name, 4, turns) == [6.0, 9.0, 12.0, 15.0]
+    assert radii_in_name(name, 4, turns[::-1]) == [15.0, 12.0, 9.0, 6.0]
+    assert radii_in_name(name, 4, [2 * t for t in turns]) == []  # turns and speeds do not agree
+    assert radii_in_name(name, 3, turns[:3]) == []
+    for said in ("PTFE_10N_r12.5mm_1", "PTFE_12,5 mm radius", "disc_R=12.5mm"):
+        assert radii_in_name(said, 1, [1.0]) == [12.5]
+    for said in ("PTFE_10N_12.5mm", "Carter12mm", "r5mm-s_1"):
+        assert radii_in_name(said, 1, [1.0]) == []
+
+
+def test_the_sliding_speed_of_turns_and_a_radius_in_the_name_is_drafted(tmp_path: Path) -> None:
+    time = np.arange(400) * 0.1
+    rows = [f"{t:.1f}\t{3.0 + 0.02 * np.sin(7 * t):.3f}\t10\t120" for t in time]
+    text = "Time [s]\tFriction force [N]\tNormal force [N]\tRotation speed [rpm]\n" + "\n".join(rows) + "\n"
+    raw = raw_folder(tmp_path / "exports", {"steel_r20mm_1.txt": text, "brass_r10mm_1.txt": text})
+    run("init", str(tmp_path / "c"), "--from", str(raw))
+    speeds = {row["radius_mm"]: float(row["speed_mm_s"]) for row in rows_of(tmp_path / "c")}
+    assert speeds == {r: pytest.approx(2 * np.pi * float(r) * 2.0, rel=1e-3) for r in ("20", "10")}

@@ -77,3 +77,18 @@ def test_every_study_holds_the_doubt(ingested: Ingested) -> None:
     name = next(iter(ingested.pulls))
     study = with_doubts(tribo.Study(times(ingested, {name: 100.0})))
     assert any(f"test {name} " in doubt.name for doubt in study.doubts)
+
+
+def test_loads_that_scatter_about_one_do_not_lead_to_another(ingested: Ingested) -> None:
+    rng = np.random.default_rng(5)
+    ids = list(ingested.pulls)[:40]
+    chosen = [t for t in ingested.campaign.tests if t.test_id in ids]
+    loads = {i: 5.0 + 0.01 * rng.standard_normal() for i in ids} | {ids[-1]: 0.42, ids[-2]: 4.7}
+    tests = tuple(replace(t, sample="F", specimen="F", normal_load_N=float(loads[t.test_id])) for t in chosen)
+    forces = {i: 0.5 * loads[i] * (1.0 + 0.03 * rng.standard_normal()) for i in ids}
+    pulls = {i: replace(ingested.pulls[i], static_N=1.1 * forces[i], sliding_N=forces[i]) for i in ids}
+    alike = replace(
+        ingested, campaign=replace(ingested.campaign, tests=tests), pulls=pulls,
+        traces={i: ingested.traces[i] for i in ids},
+    )  # fmt: skip
+    assert sibling_doubts(alike) == ()

@@ -6,6 +6,8 @@ by the columns of the file; else over the part that the file or its authors name
 
 from __future__ import annotations
 
+import csv
+import json
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -13,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from on_the_command_line import run
 
-from tribo import read_pull
+from tribo import load_campaign, read_pull
 from tribo.readers import read_blocks, read_export
-from tribo.records import STANDARD_GRAVITY, Pull, Test, Trace
+from tribo.records import STANDARD_GRAVITY, Correction, Pull, Test, Trace
 from tribo.traces import PullOptions, evaluate, pieces_of
 from tribo.zeroing import zero_choice
 
@@ -66,14 +69,14 @@ def test_every_step_of_the_plastics_has_the_mean_of_its_window() -> None:
 
 def test_composites_have_the_mean_of_the_second_half_of_their_half_hour() -> None:
     found = {}
-    for file in files("ptfe-pin-on-disc", "PPS_*.tsv"):
+    for file in files("ptfe-pin-on-disc", "PPS*.tsv"):
         table = [line.rstrip("\t").split("\t") for line in file.read_text(encoding="latin-1").splitlines()]
         rows = [cells for cells in table if len(cells) > 12 and cells[1].count(":") == 2]
         friction = np.array([float(cells[-1].replace(",", ".")) for cells in rows])
         found[file.name] = friction
         pull = read_pull(read_export(file), test=a_test())
         assert pull.sliding_N == pytest.approx(friction[friction.size // 2 :].mean(), rel=SLIDING), file.name
-    assert len(found) == 3
+    assert len(found) == 8
 
 
 def test_motor_oil_has_the_mean_torque_of_its_window_over_the_lever() -> None:
@@ -143,3 +146,67 @@ def test_the_paper_slider_has_the_mean_without_its_first_tenth() -> None:
         pull = read_pull(Trace("paper", time, ratio), test=a_test())
         assert pull.sliding_N == pytest.approx(ratio[ratio.size // 10 :].mean(), rel=SLIDING), file.name
         assert math.isnan(pull.static_N)
+
+
+def test_the_gouge_has_the_mean_coefficient_of_both_speeds() -> None:
+    (file,) = files("velocity-step-gouge", "velstep3*")
+    time, displacement, friction, stress = np.loadtxt(file, skiprows=1).T
+    tables = read_blocks(file, correction=Correction(area_m2=1e-6))
+    pulls = [evaluate(piece, own) for piece, own in pieces_of(tables, PullOptions(test=a_test())).values()]
+    assert len(pulls) == 2
+    for pull, speed in zip(pulls, (0.2, 2.0), strict=True):
+        inside = (time >= pull.window_s[0]) & (time <= pull.window_s[1])
+        assert math.isnan(pull.static_N)
+        assert abs(np.polyfit(time[inside], displacement[inside], 1)[0]) == pytest.approx(speed, rel=0.01)
+        assert pull.sliding_N == pytest.approx((friction * stress)[inside].mean(), rel=SLIDING)
+        assert pull.recorded_load_N == pytest.approx(stress[inside].mean(), rel=SLIDING)
+
+
+def test_strokes_of_the_micrometre_rig_have_half_the_difference_of_both_directions() -> None:
+    (file,) = files("reciprocating-micrometre", "test_data_2.txt")
+    time, _, position, friction = np.loadtxt(file, skiprows=1).T
+    (table,) = read_blocks(file)
+    pulls = [evaluate(piece, own) for piece, own in pieces_of(table, PullOptions(test=a_test())).values()]
+    strokes = [p for p in pulls if {"forward", "backward"} & set(p.flags) and p.recorded_load_N > 4.9]
+    assert len(strokes) > 90
+    differences = []
+    for one, other in pairwise(strokes):
+        means = [
+            friction[(time >= p.window_s[0]) & (time <= p.window_s[1])].mean() * 1e-6 for p in (one, other)
+        ]  # fmt: skip
+        for pull, way in ((one, 0), (other, 1)):
+            moved = position[(time >= pull.window_s[0]) & (time <= pull.window_s[1])]
+            assert abs(moved[-1] - moved[0]) < 240.0, way
+        if means[0] * means[1] < 0:
+            differences.append(((one.sliding_N + other.sliding_N) / 2, abs(means[0] - means[1]) / 2))
+    found, by_column = np.array(differences).T
+    assert found == pytest.approx(by_column, rel=SLIDING)
+
+
+def test_the_damper_has_the_mean_force_of_its_windows() -> None:
+    for file in files("friction-damper", "*.json"):
+        rows = np.array(json.loads(file.read_text())["data"], float)
+        time, force = rows[:, 0], rows[:, 2] * 4448.2216
+        (table,) = read_blocks(file)
+        pieces = pieces_of(table, PullOptions(test=a_test()))
+        pulls = [evaluate(piece, own) for piece, own in pieces.values()]
+        assert len(pulls) > 5, file.name
+        for pull in pulls:
+            inside = (time >= pull.window_s[0]) & (time <= pull.window_s[1])
+            way = -1.0 if "backward" in pull.flags else 1.0
+            by_column = way * force[inside].mean() - pull.zero_N
+            assert pull.sliding_N == pytest.approx(by_column, rel=SLIDING), file.name
+
+
+def test_elastomers_have_the_coefficient_of_each_row_times_its_load(tmp_path: Path) -> None:
+    (file,) = files("elastomer-per-cycle", "*.csv")
+    with file.open(encoding="utf-8-sig", newline="") as rows:
+        table = list(csv.DictReader(rows))
+    run("init", str(tmp_path / "c"), "--from", str(file.parent))
+    found = load_campaign(tmp_path / "c").tests
+    assert len(found) == len(table) == 4308
+    for test, row in zip(found, table, strict=True):
+        load_N = float(row["NominalLoad"]) * 1e-3
+        assert test.normal_load_N == pytest.approx(load_N, rel=1e-6)
+        assert test.evaluated is not None
+        assert test.evaluated["sliding_N"] == pytest.approx(float(row["CoF.mean"]) * load_N, rel=SLIDING)

@@ -282,6 +282,20 @@ def test_a_force_that_falls_to_a_tenth_keeps_its_noise_and_is_no_slipped_mark(pa
     assert read_export(path).flags == ()
 
 
+@pytest.mark.parametrize("stops", [False, True])
+def test_a_rest_with_an_offset_and_a_slide_about_ten_times_as_large_are_no_slipped_mark(
+    path: Path, stops: bool
+) -> None:
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        rest, slide = 0.1 + 0.003 * rng.standard_normal(200), 0.011 * rng.standard_normal(300)  # as rough as 4 times
+        slide += float(rng.choice([0.93, 1.07]))
+        force = np.concatenate((rest, slide, rest[:100] if stops else rest[:0]))
+        rows = [[f"{0.04 * k:.3f}", "0", f"{f:.5f}"] for k, f in enumerate(force)]
+        path.write_bytes(written(rows, NAMES, UNITS))
+        assert read_export(path).flags == (), seed
+
+
 def test_two_impulses_are_no_stretch_between_them(path: Path) -> None:
     force = pulled(np.random.default_rng(3))
     force[[180, 200]] *= 10

@@ -29,6 +29,7 @@ from tribo.drafting.file_names import (
     parts_in_words,
     proposed_patterns,
     question,
+    radii_in_name,
     where_it_stops,
 )
 from tribo.errors import CampaignError, Problem, ReadError, TriboError
@@ -167,7 +168,7 @@ def draft_campaign(
         draft.missing.append(f"{key} in campaign.toml, for which 1 was written: {what}")
     named = _named(used, patterns, draft)
     for name, found in used.items():
-        for row in _rows_of(name, found, named.get(name, {}), records):
+        for row in _at_radius(list(_rows_of(name, found, named.get(name, {}), records)), name, draft):
             draft.rows.append(row | {c: value for c, value in (filled or {}).items() if not row.get(c)})
     recorded = {f"raw/{name}" for name, found in used.items() if any(map(has_load, found))}
     in_export = [row["file"].partition("#")[0] in recorded for row in draft.rows]
@@ -258,6 +259,21 @@ def _rows_of(name: str, records: Sequence[Trace], named: Mapping[str, str], patt
     else:
         for k, record in enumerate(records, start=1):
             yield _row(f"{file}#{k}", named, record, pattern)
+
+
+def _at_radius(rows: list[dict[str, str]], name: str, draft: Draft) -> list[dict[str, str]]:
+    """Rows of one file with the sliding speed of the radius that its name states and the turns of each row."""
+    turns = [float(row.get("speed_rpm") or 0.0) / 60.0 or float(row.get("speed_rps") or 0.0) for row in rows]
+    radii = radii_in_name(name.rpartition("/")[2], len(rows), turns)
+    if not radii or not all(turns) or any("speed_mm_s" in row for row in rows):
+        return rows
+    found = []
+    for row, radius, per_s in zip(rows, radii, turns, strict=True):
+        rest = {column: text for column, text in row.items() if column not in ("speed_rpm", "speed_rps")}
+        found.append({**rest, "radius_mm": f"{radius:.6g}", "speed_mm_s": f"{2.0 * math.pi * radius * per_s:.4g}"})
+    what = "the speed is 2 pi times the radius in the names of the files times the turns"
+    draft.found += [] if what in draft.found else [what]
+    return found
 
 
 def _is_strokes(record: Trace) -> bool:

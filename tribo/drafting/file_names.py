@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -54,6 +55,13 @@ _NUMBERED = re.compile(r"[A-Za-z]{0,4}-?\d+")
 _SEPARATOR = re.compile(r"[_ ]+")
 _DASHES = re.compile("-")
 _SHOWN = 5
+_DECIMAL = r"\d+(?:[.,]\d+)?"
+_RADIUS = re.compile(
+    rf"(?<![A-Za-z0-9.,-])(?P<a>{_DECIMAL})(?:-(?P<b>{_DECIMAL}))?[ -]?mm[ _-]?(?:track[ _-]?)?(?:radius|rad)(?![a-z])"
+    rf"|(?<![A-Za-z])(?:radius|rad|r)[ _=-]?(?P<c>{_DECIMAL})[ -]?mm(?![A-Za-z/-])", re.I,
+)  # fmt: skip
+_SPEEDS = re.compile(rf"(?<![A-Za-z0-9.,-])(?P<a>{_DECIMAL})-(?P<b>{_DECIMAL})[ _]?mm-?s(?![A-Za-z])", re.I)
+_AGREE = 0.03  # share by which a speed and that of its radius and turns differ at the most
 
 
 @dataclass(frozen=True)
@@ -322,6 +330,35 @@ def parts_in_words(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
         if alike:
             lines.append(f"the same in all names, and not read: {', '.join(alike)}")
     return lines
+
+
+def radii_in_name(name: str, tables: int, turns_per_s: Sequence[float]) -> list[float]:
+    """Radius (mm) of the track of each table of a file by its name: "10mm-radius", "r=10mm"; [] where it says none.
+
+    A range such as "6-15mm-radius" goes evenly from the first table to the last. It is used only where the radii and
+    the recorded turns give the speeds that the name states as well, "300-75mm-s".
+    """
+    found = _RADIUS.search(name)
+    if found is None:
+        return []
+    first = _as_float(found["a"] or found["c"])
+    if not found["b"]:
+        return [first] * tables
+    speeds = _SPEEDS.search(name)
+    if speeds is None or tables < 2 or not all(turns > 0 for turns in turns_per_s):
+        return []
+    ends = (first, _as_float(found["b"])), (_as_float(speeds["a"]), _as_float(speeds["b"]))
+    radii, stated = ([a + (b - a) * k / (tables - 1) for k in range(tables)] for a, b in ends)
+    for one in (radii, radii[::-1]):
+        given = [2.0 * math.pi * r * turns for r, turns in zip(one, turns_per_s, strict=True)]
+        for wanted in (stated, stated[::-1]):
+            if all(abs(v / w - 1.0) < _AGREE for v, w in zip(given, wanted, strict=True)):
+                return one
+    return []
+
+
+def _as_float(text: str) -> float:
+    return float(text.replace(",", "."))
 
 
 def question(names: Sequence[str], patterns: Sequence[str], fits: Mapping[str, object]) -> Problem | None:

@@ -25,6 +25,7 @@ SPLIT = 5.0  # ratio between equal pulls that no scatter of repeats or specimens
 FEWEST_SPLIT, LEAST_SPLIT = 3, 0.25  # cells, and the share of all, that a slip of many exports splits
 MAD_TO_SD = 1.4826
 LOAD_TOLERANCE = 0.02
+LOADS_APART = 0.1  # by which two loads differ, as ln, at the least: the line of loads that are alike leads anywhere
 MOST_NAMED = 3
 FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
 NEAR = 0.25  # by which a factor may differ from that of a slip, as ln
@@ -145,7 +146,9 @@ def _beside_law(pulls: _Pulls, log_force: FloatArray) -> FloatArray:
         x, ratio = 1.0 / pulls.load_N[rows], np.exp(log_force[rows]) / pulls.load_N[rows]
         apart = x[:, None] - x[None, :]
         with np.errstate(divide="ignore", invalid="ignore"):
-            slopes = np.where(apart != 0, (ratio[:, None] - ratio[None, :]) / apart, np.nan)
+            slopes = np.where(
+                np.abs(np.log(x[:, None] / x[None, :])) > LOADS_APART, (ratio[:, None] - ratio[None, :]) / apart, np.nan
+            )
         known = np.isfinite(slopes).any(axis=1)
         slope = float(np.median(np.nanmedian(slopes[known], axis=1))) if known.any() else 0.0
         line = slope * x + np.median(ratio - slope * x)
@@ -182,7 +185,7 @@ def _spread(pulls: _Pulls, left: FloatArray) -> FloatArray:
 
 
 def _times(log_factor: float) -> str:
-    """"a hundred times" or "1.6 times"."""
+    """ "a hundred times" or "1.6 times"."""
     factor = math.exp(abs(log_factor))
     near = next((words for f, words in FACTORS.items() if abs(math.log(factor / f)) < NEAR), f"{factor:.2g}")
     return f"{near} times"
@@ -236,7 +239,7 @@ def _of_group(
 
 
 def _in_common(campaign: Campaign, test_ids: Sequence[str]) -> str:
-    """" (all of 2026-03-04)": the value of a column that these tests have and no other test."""
+    """ " (all of 2026-03-04)": the value of a column that these tests have and no other test."""
     chosen = set(test_ids)
     for name in ("started_at", "operator", "specimen", "sample", "repeat"):
         end = 10 if name == "started_at" else None

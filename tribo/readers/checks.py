@@ -28,6 +28,7 @@ _MOST_STEPS = 40  # large steps, above which they are what the signal does
 _MOST_TRIED = 10  # large steps that may begin a scaled rest of the record
 _FEWEST_ROWS, _ROWS_BESIDE = 10, 100  # looked at on either side of a jump
 _LEVEL_ROWS = (1, 10, 100)  # rows beside a jump by which the levels are compared; all are tried, as the force may swing
+_SURE = 3.0  # standard uncertainties
 _SAME_RATIO = 0.02  # share: numbers of two digits are rounded by up to 1 %
 _TIMES_IN_WORDS = {1: "ten", 2: "a hundred", 3: "a thousand"}
 
@@ -166,9 +167,7 @@ def beyond_measurement(
     return problems
 
 
-def spread_over_ticks(
-    time: FloatArray, file: str, column: str, row_of: RowOf
-) -> tuple[FloatArray, list[Problem]]:
+def spread_over_ticks(time: FloatArray, file: str, column: str, row_of: RowOf) -> tuple[FloatArray, list[Problem]]:
     """The time (s) of each row where the clock ticks slower than rows come: the rows of a tick evenly over it.
 
     A time base of which less than half the rows repeat the time of the row before is left as it is, to the bit. Returns
@@ -247,10 +246,12 @@ def _there_and_back(values: FloatArray, large: NDArray[np.int64]) -> tuple[int, 
     up = (ratio > _TEN_TIMES[0]) & (ratio < _TEN_TIMES[1])
     down = (ratio > 1 / _TEN_TIMES[1]) & (ratio < 1 / _TEN_TIMES[0])
     for i in range(large.size - 1):
-        n = int(large[i + 1] - large[i])
+        first, n = int(large[i]) + 1, int(large[i + 1] - large[i])
         there_and_back = (up[i] and down[i + 1]) or (down[i] and up[i + 1])
         if n > 1 and there_and_back and not (_is_impulse(values, large[i]) or _is_impulse(values, large[i + 1] + 1)):
-            return int(large[i]) + 1, n, 10.0 if up[i] else 0.1
+            times = 10.0 if up[i] else 0.1
+            if not _only_alike(values[:first], values[first : first + n], times):
+                return first, n, times
     return None
 
 
@@ -271,9 +272,43 @@ def _to_the_end(values: FloatArray, step: FloatArray, large: NDArray[np.int64]) 
             ratio = after / before if before else 0.0
             power = round(math.log10(ratio)) if ratio > 0 else 0
             near = 1 <= abs(power) <= 3 and _TEN_TIMES[0] / 10 < ratio / 10.0**power < _TEN_TIMES[1] / 10
-            if near and _scaled_as(10.0**power, *change):
+            if (
+                near
+                and _scaled_as(10.0**power, *change)
+                and not _only_alike(values[: k + 1], values[k + 1 :], 10.0**power)
+            ):
                 return k + 1, values.size - k - 1, 10.0**power
     return None
+
+
+def _only_alike(before: FloatArray, after: FloatArray, times: float) -> bool:
+    """Whether what follows a steady level is no scaled copy of it, such as a slide after a rest or a rest after a slide.
+
+    A slipped mark multiplies level and noise by the same power of ten, to within what so many rows tell; rows that
+    were divided are written with too few digits to tell of their noise.
+    """
+    before, after = before[-_ROWS_BESIDE:], after[:_ROWS_BESIDE]
+    if min(before.size, after.size) < _FEWEST_ROWS:
+        return False
+    level, level_u, trend = _level(before)
+    if abs(trend) > 2.0 * _SURE * level_u:
+        return False  # it was rising: no level to compare with
+    other, other_u, _ = _level(after)
+    if abs(other - times * level) > _SURE * math.hypot(other_u, times * level_u) + _SAME_RATIO * abs(other):
+        return True
+    if times < 1:
+        return False
+    changes = [_typical(np.abs(np.diff(part))) for part in (before, after)]
+    rows = min(before.size, after.size)
+    return bool(min(changes) > 0 and abs(math.log(changes[1] / changes[0] / times)) > _SURE * math.sqrt(4.0 / rows))
+
+
+def _level(values: FloatArray) -> tuple[float, float, float]:
+    """Mean, its standard uncertainty by means of tenths, and how far the mean of the later half is from the earlier."""
+    means = np.array([part.mean() for part in np.array_split(values, min(_ROWS_BESIDE // 10, values.size))])
+    u = float(means.std(ddof=1)) / math.sqrt(means.size)
+    half = values.size // 2
+    return float(values.mean()), u, float(values[half:].mean() - values[:half].mean())
 
 
 def _typical(values: FloatArray) -> float:

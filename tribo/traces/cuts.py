@@ -18,8 +18,9 @@ _REVERSED = 0.25  # share of its swing by which a force passes the middle before
 _OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
 _OF_LEVEL = 0.05  # this share of its level,
 _OF_NOISE = 6.0  # and this many times the noise of the difference
+_AT_REST_AS_ROUGH = 0.5  # share of the noise of the other direction below which a force shows a rest and no stroke
 _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
-_CLEARLY_APART = 1.5  # ratio of two speeds that the slope of a displacement tells apart
+_CLEARLY_APART = 1.25  # ratio of two speeds that the slope of a displacement tells apart
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
 
 
@@ -88,7 +89,8 @@ def reversals(force_N: FloatArray) -> list[int]:
     """Indices at which the pull changes direction: the force passes from one side of its middle to the other.
 
     The middle lies half-way between the 5th and 95th percentile; it counts as passed once the force is a quarter of
-    their distance beyond it. A force that has only one sign, or hardly leaves zero on the other side, is not reversed.
+    their distance beyond it. A force that has only one sign, or hardly leaves zero on the other side, is not reversed;
+    nor is one that stands still below, as before and after a slide.
     """
     if -float(force_N.min()) < _REVERSED * float(np.median(force_N)):
         return []  # as below, without the percentiles, which take longer
@@ -101,6 +103,10 @@ def reversals(force_N: FloatArray) -> list[int]:
     decided = np.flatnonzero(side)
     changed = np.flatnonzero(np.diff(side[decided]))
     before, after = decided[changed], decided[changed + 1]
+    if changed.size == 2 and side[decided[0]] < 0:  # a rest below zero before and after a slide is no stroke
+        low, high = (sample_noise(force_N[side == way]) for way in (-1, 1))
+        if low < _AT_REST_AS_ROUGH * high:
+            return []
     return [
         int(a) + 1 + int(np.argmin(np.abs(force_N[a + 1 : b + 1] - middle))) for a, b in zip(before, after, strict=True)
     ]

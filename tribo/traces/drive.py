@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tribo.records import FloatArray, Trace
 from tribo.traces.signal import (
     MINIMUM_SAMPLES,
+    condense,
     median_of_three,
     running_mean,
     runs_of,
@@ -176,7 +177,11 @@ def _to_and_fro(time_s: FloatArray, x: FloatArray) -> Drive | None:
     moving = size > _AT_REST * float(np.percentile(size, 75))
     side = np.sign(pace) * moving
     turns = []
+    still = np.flatnonzero(~moving)
     for end in ends:  # the drive turns half-way through its dwell at the end of a stroke
+        if moving[end] and still.size:  # noise may place the furthest position just outside of the dwell
+            nearest = int(still[np.argmin(np.abs(still - end))])
+            end = nearest if abs(nearest - end) <= 4 * width else end
         before, after = np.flatnonzero(moving[:end]), np.flatnonzero(moving[end:])
         if before.size and after.size:
             turns.append((int(before[-1]) + 1 + end + int(after[0])) // 2)
@@ -347,6 +352,12 @@ _SURELY = 0.35  # share of the way from the roughness at rest to that of a slide
 _SETTLES = 0.25  # share of its whole fall by which a force still changes in the last third of a stop
 _GAP = 4  # widths that a fall of the force at rest is felt at the most
 _DWELLS = 0.4  # share of its rise that a stop dwells before the force climbs
+_MOST_TRIED = 2000  # samples of a stroke among which its stop is looked for
+_COARSELY = 150  # and at first
+_FEWEST_RELAXED = 8  # of them that a stop lasts at the least,
+_SHORTEST_RELAXED = 0.03  # and this share of the stroke
+_LIKELIER = 20.0  # by twice the logarithm of the likelihood a stop is likelier than one line
+_QUIETER = 1.4  # times as rough as at rest is a force that slides
 _CLIMBS = 6.0  # times its scatter by which a force climbs at a restart
 _MOST = 60
 
@@ -397,6 +408,71 @@ def standstills(force_N: FloatArray) -> tuple[list[Range], int] | None:
             slid = int(b)
     found = len(stops) + int(end < n)  # a force that swings is calm now and then
     return (stops, end) if 0 < found <= _MOST and 2 * found >= calm else None
+
+
+def relaxes_from(force_N: FloatArray, *, clearly: bool = False) -> int:
+    """The sample from which on the force of one stroke relaxes, as its drive stands still; its size if it does not.
+
+    Before it the force follows a line and is rough, after it an exponential and is smooth: the two that are likeliest
+    together, each with a scatter of its own. Noise that is correlated counts as so many fewer samples. ``clearly`` asks
+    that it is rough from sample to sample.
+    """
+    factor = max(force_N.size // _MOST_TRIED, 1)
+    if force_N.size < 8 * _FEWEST_RELAXED:
+        return force_N.size
+    values = condense(force_N * (np.sign(float(np.median(force_N))) or 1.0), factor)
+    least = max(_FEWEST_RELAXED, int(_SHORTEST_RELAXED * values.size))
+    if values.size < 8 * least:
+        return force_N.size
+    skip = values.size // 4
+    rest = values[skip : values.size - least // 2]  # the last samples may turn already
+    if clearly and not sample_noise(rest[:-least]) > _CONTRAST * sample_noise(rest[-least:]):
+        return force_N.size
+    rest = rest - float(rest.mean())
+    few = max(rest.size // _COARSELY, 1)
+    taus = np.geomspace(2.0, 2.0 * rest.size, 20)
+    _, at, *_, tau = _parted_at(condense(rest, few), range(2 * least // few, (rest.size - least) // few), taus / few)
+    at, tau = at * few, tau * few
+    for nearer, reach in ((1.5, 2 * few), (1.1, few), (1.01, few)):
+        near = range(max(at - reach, 2 * least), min(at + reach + 1, rest.size - least))
+        unlikely, at, slide, still, tau = _parted_at(rest, near, tau * np.geomspace(1.0 / nearer, nearer, 16))
+    if at == rest.size:
+        return force_N.size
+    along = np.arange(rest.size, dtype=float)
+    whole, away = (
+        rest[:end]
+        - np.polynomial.polynomial.polyval(along[:end], np.polynomial.polynomial.polyfit(along[:end], rest[:end], 1))
+        for end in (rest.size, at)
+    )
+    alike = float(np.clip(away[1:] @ away[:-1] / max(float(away @ away), 1e-300), 0.0, 0.95))
+    gain = rest.size * math.log(max(float(whole @ whole) / rest.size, 1e-300)) - unlikely
+    falls = float(rest[max(at - at // 4, 0) : at].mean() - rest[-max((rest.size - at) // 3, 1) :].mean())
+    found = gain * (1.0 - alike) / (1.0 + alike) > _LIKELIER and slide > _QUIETER * still and falls > _BELOW * slide
+    if clearly:  # a force with steps is far from its line and not rough
+        found = found and sample_noise(rest[:at]) > _CONTRAST * sample_noise(rest[at:])
+    return (skip + at) * factor if found else force_N.size
+
+
+def _parted_at(rest: FloatArray, starts: range, taus: FloatArray) -> tuple[float, int, float, float, float]:
+    """Where a force goes over from a line to an exponential: minus twice the logarithm of the likelihood, the sample,
+    both scatters, and the time constant in samples; the size of the force as the sample where none was tried."""
+    floor = (1e-5 * float(np.ptp(rest)) + 1e-300) ** 2
+    along = np.arange(rest.size, dtype=float)
+    t, y, tt, ty, yy = (np.cumsum(v) for v in (along, rest, along**2, along * rest, rest**2))
+    best = math.inf, rest.size, 0.0, 0.0, 1.0
+    for at in starts:
+        k, n = at - 1, float(at)
+        spread = tt[k] / n - (t[k] / n) ** 2
+        rough = yy[k] / n - (y[k] / n) ** 2 - ((ty[k] / n - t[k] * y[k] / n**2) ** 2 / spread if spread > 0 else 0.0)
+        part = rest[at:] - rest[at:].mean()
+        decay = np.exp(-along[: part.size] / taus[:, None])
+        decay -= decay.mean(axis=1, keepdims=True)
+        left = float(part @ part) - (decay @ part) ** 2 / np.maximum((decay**2).sum(axis=1), 1e-300)
+        rough, smooth = max(float(rough), floor), max(float(left.min()) / part.size, floor)
+        unlikely = at * math.log(rough) + part.size * math.log(smooth)
+        if unlikely < best[0]:
+            best = unlikely, at, math.sqrt(rough), math.sqrt(smooth), float(taus[int(np.argmin(left))])
+    return best
 
 
 def _comes_to_rest(force: FloatArray, level: float, rest: float) -> bool:

@@ -27,6 +27,7 @@ from tribo.traces.drive import (
     level_of,
     levels_of,
     quiet_end,
+    relaxes_from,
     standstills,
 )
 from tribo.traces.loading import loading_of, starting_level
@@ -147,6 +148,12 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
             last = max(reversals(signal.force_N), default=0)
             end = min(end, last + quiet_end(signal.force_N[last:]))
         end = max(end, stops[-1][1] + 1) if stops else end
+    if drive is None and not reversals(signal.force_N):
+        last = stops[-1][1] if stops else contact[0]
+        force = _over_load(trace, signal, contact).force_N[last:end]
+        for _ in range(2):  # the drive stops, and later the load is taken off
+            force = force[: relaxes_from(force, clearly=True)]
+        end = last + force.size
     rests += [(a, b) for a, b in ((0, contact[0]), (contact[1], samples)) if b - a >= FEWEST_AT_REST]
     return Course(contact, end, tuple(stops), tuple(sorted(rests)), at_once)
 
@@ -169,8 +176,7 @@ def course_of_piece(trace: Trace, signal: Signal, *, starts_sliding: bool) -> Co
 
 def stands_from(force_N: FloatArray) -> int:
     """The sample of one stroke from which its drive stands still until the end, by its force; its size without one."""
-    told = standstills(force_N)
-    return told[1] if told is not None and told[1] < force_N.size else quiet_end(force_N)
+    return min(relaxes_from(force_N), quiet_end(force_N))
 
 
 def _before_it_turns(force_N: FloatArray) -> int:

@@ -28,6 +28,7 @@ _COSINES_OF_ALL = 20  # the same of a whole slide
 _COSINES_OF_STROKE = 4  # the same of a stroke, whose neighbours tell of its noise as well
 _FEWEST = 12  # samples from which on a mean has an interval
 _MIDDLE = 0.4  # share of a stroke, around its middle, whose force is that of the stroke
+_FEWEST_APART = 4  # differences between strokes of one way from which on they tell of the noise of a stroke
 _DIFFER = 0.05  # share by which speeds or loads of two plateaus differ that make a step
 _BLOCKS = 240  # means along a slide by which its running-in is told
 _LATE = 0.2  # share of a slide at its end that is to be level
@@ -198,9 +199,7 @@ def _plateau(level: _Level, way: str, viscosity_Pa_s: float) -> Reading:
         hersey = viscosity_Pa_s * speed / load
         values |= {"hersey_per_m": (hersey, hersey, hersey)} if math.isfinite(hersey) else {}
     phase = level.phase
-    return Reading(
-        level.part.test.test_id, "plateau", phase.start_s, phase.end_s, speed, load, way=way, values=values
-    )
+    return Reading(level.part.test.test_id, "plateau", phase.start_s, phase.end_s, speed, load, way=way, values=values)
 
 
 def _step(one: _Level, other: _Level) -> Iterator[Reading]:
@@ -249,7 +248,11 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
     for tau in np.geomspace(0.3 * half, 6.0 * half, 60):
         design = np.column_stack((np.ones(part.size), np.exp(-along / tau)))
         best, *_ = np.linalg.lstsq(design, part, rcond=None)
-        fits.append((float(((part - design @ best) ** 2).sum()), float(best.sum()), design))
+        # the extreme lies where the rise first meets the course of the fall
+        before = best[0] + best[1] * np.exp((at - np.arange(at + 1.0)) / tau)
+        beyond_it = (calm[: at + 1] - before) if upward else (before - calm[: at + 1])
+        meets = int(np.argmax(np.append(beyond_it[:at] >= 0, True)))
+        fits.append((float(((part - design @ best) ** 2).sum()), float(before[meets]), design))
     squares, top, design = min(fits, key=lambda fit: fit[0])
     variance, _ = _variance(part - design @ np.linalg.lstsq(design, part, rcond=None)[0], 3)
     variance = max(variance, squares / (part.size - 3))
@@ -285,11 +288,17 @@ def _strokes(parts: Sequence[Part]) -> list[_Stroke]:
     if not found:
         return []
     noise = [_variance(_without_line(force), 2, _COSINES_OF_STROKE) for _, _, force in found]
-    variance = float(np.mean([share for share, _ in noise]))
+    means = np.array([float(force.mean()) for _, _, force in found])
+    squares = float(np.mean([share / force.size for (share, _), (_, _, force) in zip(noise, found, strict=True)]))
     dof = sum(cosines for _, cosines in noise)
+    side = means > (means.max() + means.min()) / 2.0
+    apart = np.concatenate([np.diff(means[side]), np.diff(means[~side])])
+    if apart.size >= _FEWEST_APART and (between := float(apart @ apart) / apart.size / 2.0) > squares:
+        squares, dof = between, int(apart.size)  # from stroke to stroke of one way
+    half = _t(dof) * math.sqrt(squares)
     return [
-        _Stroke(part, phase, _about(float(force.mean()), _t(dof) * math.sqrt(variance / force.size)), phase.speed_m_s)
-        for part, phase, force in found
+        _Stroke(part, phase, _about(float(mean), half), phase.speed_m_s)
+        for (part, phase, _), mean in zip(found, means, strict=True)
     ]
 
 
@@ -305,9 +314,10 @@ def _cycles(strokes: Sequence[_Stroke]) -> Iterator[Reading]:
     while k + 1 < len(strokes):
         one, other = strokes[k], strokes[k + 1]
         k += 1
-        if one.middle[0] * other.middle[0] >= 0 and (one.middle[0] - one.part.pull.zero_N) * (
-            other.middle[0] - other.part.pull.zero_N
-        ) > 0:
+        if (
+            one.middle[0] * other.middle[0] >= 0
+            and (one.middle[0] - one.part.pull.zero_N) * (other.middle[0] - other.part.pull.zero_N) > 0
+        ):
             continue
         k, number = k + 1, number + 1
         half = _half(one.middle) / 2.0, _half(other.middle) / 2.0
@@ -410,9 +420,7 @@ def _state(time_s: FloatArray, force: FloatArray) -> Literal["steady", "still dr
     near = [changes for other, changes, _ in found if other <= squares + 4.0 * variance]
     level = abs(float(force[int(late * n) :].mean()))
     factor = float(t.ppf(_SURE, dof)) * math.sqrt(variance)
-    most, straight_most = (
-        max(changes[k][0] + factor * math.sqrt(changes[k][1]) for changes in near) for k in (0, 1)
-    )
+    most, straight_most = (max(changes[k][0] + factor * math.sqrt(changes[k][1]) for changes in near) for k in (0, 1))
     drifts, straight_drifts = (
         min(changes[k][0] - factor * math.sqrt(changes[k][1]) for changes in near) > 0 for k in (0, 1)
     )
