@@ -282,7 +282,7 @@ def _to_the_end(values: FloatArray, step: FloatArray, large: NDArray[np.int64]) 
 
 
 def _only_alike(before: FloatArray, after: FloatArray, times: float) -> bool:
-    """Whether what follows a steady level is no scaled copy of it, such as a slide after a rest or a rest after a slide.
+    """Whether what follows a steady level is no scaled copy of it, as a slide after a rest or a rest after a slide.
 
     A slipped mark multiplies level and noise by the same power of ten, to within what so many rows tell; rows that
     were divided are written with too few digits to tell of their noise.
