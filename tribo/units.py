@@ -47,7 +47,7 @@ QUANTITIES: dict[str, Quantity] = {
             reibungskraft, force de frottement, load, force, standard force, standardkraft, prufkraft, kraft,
             force standard, fx, ff, ft, f, load cell, axial force, traction force 1, effort, last, tangential load,
             tangentialkraft, force tangentielle, horizontal force, pull force, pulling force, tensile force,
-            frictional force, friction load, frictional load, fr, f r, f t, f x,
+            frictional force, friction load, frictional load, fr, f r, f t, f x, f f,
             sled force, fuerza de friccion, forza di attrito, fuerza, forza, forca, kracht, carga, force x, fx force,
             daq fx, tensile load, zugkraft, charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft,
             friktion, wrijvingskracht, treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta,
@@ -69,7 +69,7 @@ QUANTITIES: dict[str, Quantity] = {
         _quantity("normal force", "N", "N", "normal_force_N", """
             normal force, normal load, vertical force, normal force fz, ball load, pin load, contact force, normalkraft,
             f n, f z, normal, contact load, specimen load, applied normal load, applied normal force,
-            vertical load, down force,
+            carico normale, carico, vertical load, down force,
             force normal, load normal, normalbelastung, normallast, anpresskraft, charge normale, effort normal,
             force normale, fz, fn, fz force, daq fz, nominal load, force z, carga normal, forza normale, fuerza normal,
             sila normalna, obciazenie normalne, sila nacisku, normaalivoima, normaalkracht, normalova sila,

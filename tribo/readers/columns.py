@@ -29,6 +29,14 @@ _MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coeffic
 }  # fmt: skip
 _A_RATIO_BESIDE_STRESS = {"friction", "friktion", "frottement", "tarcie", "reibung"}  # without a unit
 _LOAD_AND_PATH = ("normal force", "displacement")  # what a test is about: an unknown unit of theirs is a fault
+_ALONG_THE_AXIS = {"axial force", "axial load", "thrust", "thrust force"}
+_SAYS_FRICTION = re.compile(
+    r"friction|friccion|rozamiento|frottement|attrito|atrito|friktion|reib|tarci|wrijving|treni|surtunme|frecare|kitka|"
+    r"tangential|tangentiel|трени|摩擦力|마찰력"
+)
+_SAYS_NORMAL = re.compile(r"\bnorma[al]|normalkraft|normallast|нормальн|法向|垂直力|수직")
+_NO_FORCE = re.compile(r"set ?point|\bset\b|target|soll|limit|max|min|\bstd\b|\bsd\b|deviation|error|zero|offset")
+_CLOCK_OF_RATE = re.compile(r"^(?:zeit|time|temps)\b.*rate$")  # "Zeit  1 - Standardmessrate"
 _ONLY_WITH_UNIT = ("radius", "normal stress", "shear stress")  # of no use without one, and missed by nobody
 _A_RATIO = re.compile(r"\b(?:cof|coeff?|coefficient|koeffizient|coefficiente?)\b|friction factor|reibwert|reibzahl")
 _RPM = ("rpm", "RPM", "rev/min", "r/min", "1/min", "U/min", "tr/min", "obr/min", "об/мин", "转/分")
@@ -322,10 +330,14 @@ def _matches(
         for index, name in enumerate(names)
         if name and index not in taken and filled[index] and (hit := match_column(name))
     }
+    for index in sorted({*range(len(names))} - taken - set(hits)):
+        if filled[index] and names[index] and (hit := by_a_word(names[index], _unit_of(names, units, index))):
+            hits[index] = hit
     there = asked | {quantity for quantity, _ in hits.values()}
-    for index in {*range(len(names))} - taken - set(hits):
-        if filled[index] and names[index] and _unit_of(names, units, index) in _RPM:
-            hits[index] = ("rotation speed", len(QUANTITIES["rotation speed"].aliases))
+    if "torque" in there:  # along the axis about which it acts
+        for index in hits:
+            if plain_name(split_unit(names[index])[0]) in _ALONG_THE_AXIS:
+                hits[index] = ("normal force", len(QUANTITIES["normal force"].aliases))
     loads = [index for index in hits if split_unit(names[index])[0].strip().lower() in _MEANS_NORMAL_BESIDE_FRICTION]
     friction = [(rank, index) for index, (quantity, rank) in hits.items() if quantity == "friction force"]
     of_another = "friction force" in asked or bool(friction and min(friction)[1] not in loads)
@@ -342,9 +354,22 @@ def _matches(
     return [(q, index, f'named "{names[index]}"') for q, (_, index) in best.items()]
 
 
-def _by_its_unit(
-    names: Sequence[str], units: Sequence[str], index: int, hit: tuple[str, int]
-) -> tuple[str, int]:
+def by_a_word(name: str, unit: str) -> tuple[str, int] | None:
+    """What a column is whose name holds a telling word, "RMS friction force", and whose unit agrees; None otherwise."""
+    plain = plain_name(split_unit(name)[0])
+    if unit in _RPM:
+        return "rotation speed", len(QUANTITIES["rotation speed"].aliases)
+    if _CLOCK_OF_RATE.search(plain) and is_unit(unit, "time"):
+        return "time", len(QUANTITIES["time"].aliases)
+    if unit and is_unit(unit, "normal force") and not _NO_FORCE.search(plain):
+        if _SAYS_NORMAL.search(plain):
+            return "normal force", len(QUANTITIES["normal force"].aliases) + 1
+        if _SAYS_FRICTION.search(plain):  # before names such as load or force, which say less
+            return "friction force", QUANTITIES["friction force"].aliases.index("lateral force")
+    return None
+
+
+def _by_its_unit(names: Sequence[str], units: Sequence[str], index: int, hit: tuple[str, int]) -> tuple[str, int]:
     """What a column is where its unit, or the lack of one, tells more than its name."""
     unit = _unit_of(names, units, index)
     if hit[0] == "speed" and turns_a_time(unit):

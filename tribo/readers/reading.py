@@ -465,7 +465,8 @@ def _explained(why: ReadError, machine: Machine, source: Source, layout: Layout)
             what = "a time of day, not a time in seconds"
             problems[k] = replace(problem, kind="time_of_day", what=what, found=cells[at], allowed=_INSTEAD_OF_A_CLOCK)
     if machine.advice:
-        problems = [replace(p, allowed=machine.advice) for p in problems]
+        # the load that a coefficient needs is no matter of names and units
+        problems = [p if p.kind == "missing_load" else replace(p, allowed=machine.advice) for p in problems]
     elif looks_wide(layout):
         problems = [replace(p, allowed=f"{_WIDE}; {p.allowed}") for p in problems]
     return problems

@@ -8,7 +8,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.columns import Given, Hint, bare_unit, is_unit, match_column, split_unit
+from tribo.readers.columns import Given, Hint, bare_unit, by_a_word, is_unit, match_column, split_unit
 from tribo.readers.layout import Layout, cut
 from tribo.readers.source import Source
 from tribo.units import QUANTITIES
@@ -139,7 +139,8 @@ def _is_a_force_by_unit(layout: Layout, k: int) -> bool:
     """Whether a column without a known name, and with one that is no number, has a unit of force."""
     name, unit = split_unit(layout.names[k])
     unit = bare_unit(layout.units[k]) or unit or ""
-    named = bool(name) and not _NUMERIC.fullmatch(name) and not _quantity(layout.names[k])
+    told = _quantity(layout.names[k]) or (by_a_word(name, unit) or ("",))[0] == "normal force"
+    named = bool(name) and not _NUMERIC.fullmatch(name) and not told
     return named and bool(unit) and unit not in ("g", "kg") and is_unit(unit, "friction force")
 
 
