@@ -24,6 +24,7 @@ from tribo.fitting.dependence import dependence
 from tribo.plausibility import doubts_of
 from tribo.records import Campaign, Ingested, Pattern, Pull, Study, Test, Trace
 from tribo.wording.part_sentences import cause_sentence, layer_sentence
+from tribo.wording.verdict_sentences import meanings
 
 Change = Callable[[dict[str, Any]], float]
 Further = Callable[[dict[str, Any]], dict[str, Any]]
@@ -228,3 +229,13 @@ def test_loads_that_were_meant_to_be_one_are_no_doubtful_number(tmp_path: Path, 
     tests = tuple(replace(t, normal_load_N=2.0 * (spread if k % 2 else 1.0)) for k, t in enumerate(campaign.tests))
     found = doubts_of(replace(campaign, tests=tests))
     assert any("range of the loads" in str(doubt) for doubt in found) is doubted
+
+
+def test_running_in_within_records_is_not_explained_as_a_matter_of_first_pulls() -> None:
+    records = running_in(long_slides(0.3))
+    within = Verdict(verdict="named", causes=(Cause("run_in", 1.0, {}, shows=records),))
+    over_pulls = Verdict(verdict="named", causes=(Cause("run_in", 1.0, {}),))
+    assert [text for _, text in meanings(within)] == [
+        "Within one record, friction changes with the distance before it is steady."
+    ]
+    assert "first pulls" in meanings(over_pulls)[0][1]

@@ -62,8 +62,10 @@ def name_in_words(name: str) -> str:
     return name.replace("_", " ") if name.isidentifier() else name
 
 
-def meaning_in_words(name: str) -> str:
-    """What a mechanism that a verdict names means, as a clause."""
+def meaning_in_words(name: str, shows: object = None) -> str:
+    """What a mechanism that a verdict names means, as a clause; ``shows`` is what showed it."""
+    if isinstance(shows, tuple) and shows and isinstance(shows[0], RunningIn):
+        return "within one record, friction changes with the distance before it is steady"
     _, _, column = name.partition(":")
     return f"friction follows the recorded column {in_words(column)}" if column else mechanism(name).meaning
 

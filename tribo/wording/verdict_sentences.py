@@ -207,7 +207,8 @@ def _seen_in_traces(v: Verdict) -> str:
     others = [name_in_words(name) for name in ties if name != cause.mechanism]
     or_else = f"; {joined(others)} would explain the data equally well" if others else ""
     size = f": {_parameters(cause)}" if cause.parameters else ""
-    return f"{sentence_case(meaning_in_words(cause.mechanism))} ({name_in_words(cause.mechanism)}){size}{or_else}."
+    meaning = sentence_case(meaning_in_words(cause.mechanism, cause.shows))
+    return f"{meaning} ({name_in_words(cause.mechanism)}){size}{or_else}."
 
 
 def _parameters(cause: Cause) -> str:
@@ -270,8 +271,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
         if weak:
             sizes = ", ".join(f"{name_in_words(name)} {size:.0f} %" for name, size in weak)
             yield (
-                "This campaign would have shown these effects with a probability of one half (peak to peak): "
-                f"{sizes}."
+                f"This campaign would have shown these effects with a probability of one half (peak to peak): {sizes}."
             )
     elif v.verdict == "named":
         these = "this mechanism" if len(v.causes) == 1 else "these mechanisms"
@@ -442,8 +442,11 @@ def copied_sentence(copied: Sequence[Sequence[str]]) -> list[str]:
 
 def meanings(v: Verdict | None) -> tuple[tuple[str, str], ...]:
     """The plain name and the meaning of every mechanism that the verdict names, each once."""
-    names = dict.fromkeys(c.mechanism for c in v.causes) if v is not None else {}
-    return tuple((sentence_case(name_in_words(name)), f"{sentence_case(meaning_in_words(name))}.") for name in names)
+    shown = {c.mechanism: c.shows for c in v.causes} if v is not None else {}
+    return tuple(
+        (sentence_case(name_in_words(name)), f"{sentence_case(meaning_in_words(name, shows))}.")
+        for name, shows in shown.items()
+    )
 
 
 def why_next(v: Verdict) -> str:
