@@ -391,7 +391,7 @@ def _sled(campaign: Campaign) -> Iterator[Doubt]:
     cells = [(t.sample, round(t.normal_load_N, 9)) for t in campaign.tests]
     is_sled = any(t.load_from == "mass_g" for t in campaign.tests)
     if is_sled and len(cells) > len(set(cells)) and all(t.specimen in ("", t.sample) for t in campaign.tests):
-        slip = "without it, all pulls of a sample count as of one body, and uncertainties may be too small"
+        slip = "column left out? All pulls of a sample then count as of one body; uncertainties may be too small"
         place = f"{_TABLE}, column specimen"
         yield Doubt("specimen", "the specimen of each test", "not stated", "a name for each", place, slip)
 

@@ -38,6 +38,7 @@ TAKEN_UP = {
     "hidden": "the error of the model for the patterns, or a difference between specimens or days, could look the same",
 }
 MOST_LISTED, MOST_RECORDS = 6, 8
+SYMBOLS = {"mu": "μ", "T0": "T₀"}  # of parameters of a law in a sentence
 ALONE = {
     "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
     "sample": "Pull one fresh specimen of every sample in turn, at one load and within one day",
@@ -231,7 +232,7 @@ def _own_law(layer: Layer) -> str:
     (regime,), (sample,) = layer.regimes, layer.samples
     if "T/N" in layer.parameters:
         return f"Mean {regime} T/N of {sample}: {_sized(layer.parameters['T/N'])}; the loads do not determine a law."
-    sizes = ", ".join(f"{n} = {_sized(e)}" for n, e in layer.parameters.items())
+    sizes = joined([f"{SYMBOLS.get(n, n)} = {_sized(e)}" for n, e in layer.parameters.items()])
     said = f"{sentence_case(regime)} friction of {sample} follows {layer.formula} with {sizes}."
     if layer.shows is None:
         return said
@@ -240,6 +241,8 @@ def _own_law(layer: Layer) -> str:
         return f"{said} A straight line leaves no certain part of T that does not depend on the load."
     if constant.value < 0.0:
         return f"{said} A straight line falls to {_sized(constant)} at zero load: friction is weak at small loads."
+    if "T0" in layer.parameters:
+        return f"{said} At {load_N:.3g} N, T₀ is {share_percent:.0f} % of T."
     return (
         f"{said} A straight line leaves {_sized(constant)} at zero load: {share_percent:.0f} % of T at "
         f"{load_N:.3g} N does not depend on the load."

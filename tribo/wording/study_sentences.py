@@ -406,7 +406,8 @@ def _dependence(study: Study) -> Iterator[str]:
         change = f"{percent(row['change_percent'] / 100)} from {significant(row['low'])} to {significant(row['high'])}"
         yield (
             f"{row['regime'].capitalize()} T/N of {row['sample']} varies with {row['label']}: {change} (rank "
-            f"correlation {row['rank']:.2f}, adjusted p {p_text(row['p_adjusted'])}, {counted(row['n'], 'test')})."
+            f"correlation {significant(row['rank'], 2)}, adjusted p {p_text(row['p_adjusted'])}, "
+            f"{counted(row['n'], 'test')})."
         )
     yield from _inseparable(table)
 
