@@ -80,7 +80,7 @@ def test_the_law_of_every_sample_is_a_layer_with_its_parameters(tmp_path: Path) 
     assert b.low < b.value < b.high
     assert b.value == pytest.approx(0.8, abs=3 * 0.007)  # six repeats of 3 % at five loads: 0.7 % of standard error
     assert laws["B"].parameters["T0"].low < 1.0 < laws["B"].parameters["T0"].high
-    assert "does not depend on the load" in laws["B"].text
+    assert "At 4 N, T₀ is 45 % of T." in laws["B"].text  # 1 N of 0.3 x 4 N + 1 N
 
 
 def test_a_dependence_on_speed_is_named_with_its_size(tmp_path: Path) -> None:

@@ -13,11 +13,11 @@ import pytest
 from report.conftest import Written
 from report.laid_out import html
 from report.synthetic import verdict_of
-from tribo.diagnostics.verdict import Cause, Estimate
+from tribo.diagnostics.verdict import Cause, Estimate, Verdict
 from tribo.errors import Problem
 from tribo.mechanisms import MECHANISMS
 from tribo.records import LawFit, SetAside, Study
-from tribo.wording.card import Card, card_law, card_of
+from tribo.wording.card import Card, card_law, card_of, to_know
 from tribo.wording.terminal import card_text, verdict_text
 from tribo.wording.verdict_sentences import why_next, worded
 
@@ -177,6 +177,18 @@ def test_a_law_that_is_no_straight_line_is_said(study: Study) -> None:
     fits = tuple(replace(f, notes=(note,), bent=True, chi2_red=19.31) if f.sample == "C" else f for f in study.fits)
     said = card_of(replace(study, fits=fits), verdict_of(FOUND)).to_know
     assert any("not a straight line for C static (χ²/ν = 19) and C sliding (χ²/ν = 19)" in s for s in said)
+
+
+def test_a_cause_that_bends_the_law_is_named_beside_it(study: Study) -> None:
+    """A wrong weight is no physics of the sample: the card says that the bend is what it would do."""
+    bent = replace(study, fits=tuple(replace(f, bent=True) if f.sample == "C" else f for f in study.fits))
+
+    def said(cause: str) -> str:
+        verdict = Verdict("named", causes=(Cause(cause, 1.0, {}),))
+        return next(s for s in to_know(bent, verdict) if "not a straight line" in s)
+
+    assert said("wrong_weight").endswith("This is what a wrong weight would do.")
+    assert said("humidity").endswith("depend on the range of loads.")
 
 
 def test_another_flat_sample_than_f_is_said(study: Study) -> None:

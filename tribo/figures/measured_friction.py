@@ -158,6 +158,7 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
     figure, axes = style.panel_grid(len(regimes), 70, columns=len(regimes))
     for ax, regime in zip(axes, regimes, strict=True):
         part = numbers[numbers["regime"] == regime]
+        colours: dict[str, list[str]] = {}
         for number, points in style.by_sample(part):
             colour, marker = style.sample_mark(number)
             measured = points[points["mark"] == "measured"]
@@ -165,9 +166,12 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
             ax.plot(load, force, marker, ms=3, color=colour, mfc="none", mew=0.6)
             for formula, line in points[points["mark"] != "measured"].groupby("mark"):
                 ax.plot(line["normal_load_N"], line["T_N"], color=colour, lw=1.1)
-                below = -LINE_POINTS * (len(ax.texts) + 1)
-                ax.annotate(str(formula), (0.02, 1.0), (0.0, below), xycoords="axes fraction",
-                            textcoords="offset points", color=colour, fontsize=7)  # fmt: skip
+                colours.setdefault(str(formula), []).append(colour)
+        for place, (formula, of) in enumerate(colours.items(), start=1):  # one law of several samples once, in black
+            ax.annotate(
+                formula, (0.02, 1.0), (0.0, -LINE_POINTS * place), xycoords="axes fraction",
+                textcoords="offset points", color=of[0] if len(of) == 1 else "black", fontsize=7,
+            )  # fmt: skip
         style.panel_title(ax, sentence_case(f"{regime} friction"))
         ax.set_xlabel("Normal load N (N)")
         ax.set_ylabel("Friction force T (N)")

@@ -15,6 +15,7 @@ from tribo.comparison import study_lookup
 from tribo.comparison.study_lookup import all_set_aside
 from tribo.diagnostics.verdict import Verdict
 from tribo.display import displayed
+from tribo.mechanisms import MECHANISMS
 from tribo.records import PA_PER_KPA, REGIMES, LawFit, Study
 from tribo.wording.numerals import counted, joined, loads_in_words, with_uncertainty
 from tribo.wording.part_sentences import name_in_words
@@ -132,7 +133,9 @@ def to_know(study: Study, verdict: Verdict | None) -> Iterator[str]:
         reasons = sorted(aside.items(), key=lambda item: -item[1])[:MOST_REASONS]
         yield f"Tests set aside: {'; '.join(f'{count} × {reason}' for reason, count in reasons)}."
     yield from _flat(study)
-    yield from bent_laws(study)
+    bending = [c.mechanism for c in (verdict.causes if verdict is not None else ()) if _bends(c.mechanism)]
+    because = f" This is what {joined([name_in_words(name) for name in bending])} would do." if bending else ""
+    yield from (f"{said}{because}" for said in bent_laws(study))
     if verdict is not None:
         if ties := [names for names in verdict.equivalent if len(names) > 1]:
             tied = "; ".join(" or ".join(map(name_in_words, names)) for names in ties)
@@ -148,6 +151,12 @@ def to_know(study: Study, verdict: Verdict | None) -> Iterator[str]:
         yield f"The peak or the window of {counted(moved, 'pull')} was moved by hand."
     if study.undiagnosed:
         yield f"no diagnosis: {study.undiagnosed}"
+
+
+def _bends(name: str) -> bool:
+    """Whether a cause changes T by another share at every load."""
+    m = MECHANISMS.get(name.partition(":")[0])
+    return m is not None and (m.choosing.column == "normal_load_N" or "normal_load_N" in m.needs)
 
 
 def _flat(study: Study) -> Iterator[str]:
