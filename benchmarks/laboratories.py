@@ -2,6 +2,7 @@
 
     python benchmarks/laboratories.py run    out/laboratories.jsonl                 all cells; goes on where it stopped
     python benchmarks/laboratories.py run    out/laboratories.jsonl --only nuisance --count 60 --seed 7
+    python benchmarks/laboratories.py run    out/laboratories.jsonl --share 0.2     a fifth of every cell
     python benchmarks/laboratories.py tables out/laboratories.jsonl                 the tables, printed
 
 The generator is in tests/laboratories. A run appends one line a campaign, in random order, so that a part of a run is
@@ -32,8 +33,8 @@ def planned(options: argparse.Namespace) -> list[Piece]:
     """The campaigns that were asked for, in random order."""
     todo = [
         piece
-        for name, cell in CELLS.items() if options.only in (name, "all")
-        for piece in cell.pieces(name, options.count or cell.count, options.seed)
+        for name, cell in CELLS.items() if options.only in (name, "all") and name not in options.without
+        for piece in cell.pieces(name, options.count or round(options.share * cell.count), options.seed)
     ]  # fmt: skip
     np.random.default_rng(options.seed).shuffle(todo)  # type: ignore[arg-type]
     return todo
@@ -55,6 +56,8 @@ def main() -> None:
     parser.add_argument("path", type=Path, help="JSON lines, one a campaign")
     parser.add_argument("--only", choices=("all", *CELLS), default="all", help="one cell")
     parser.add_argument("--count", type=int, default=0, help="campaigns of each cell; by default what is asked for")
+    parser.add_argument("--share", type=float, default=1.0, help="of what is asked for, in every cell")
+    parser.add_argument("--without", action="append", default=[], choices=tuple(CELLS), help="a cell; may be repeated")
     parser.add_argument("--seed", type=int, default=2401)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()

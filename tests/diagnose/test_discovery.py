@@ -131,7 +131,8 @@ def test_one_afternoon_is_no_law_of_the_time_of_day() -> None:
 
 def test_no_wave_of_the_time_since_the_first_pull_stands_for_a_day() -> None:
     c = baseline(made(nothing, seed=1, design=DAYS)).setup.observations.conditions
-    waves = {(s.column, s.width) for (s, *_), _ in shapes_of(c) if s.kind == "wave" and s.column != "run_order"}
+    times = ("clock_h", "elapsed_s", "specimen_run")
+    waves = {(s.column, s.width) for (s, *_), _ in shapes_of(c) if s.kind == "wave" and s.column in times}
     assert waves == {("clock_h", 24.0), ("clock_h", 12.0), ("clock_h", 8.0)}
     assert {len(fine_shapes(Shape("wave", name, width=width), c)) for name, width in waves} == {1}
 

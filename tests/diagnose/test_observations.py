@@ -198,3 +198,10 @@ def test_twelve_tests_at_two_loads_are_the_least(tests: int, loads: int, enough_
         return
     with pytest.raises(FitError, match=f"{tests} tests at {loads} loads"):
         enough(o)
+
+
+def test_a_hold_of_0_s_and_a_temperature_of_0_degrees_are_values_and_no_gaps() -> None:
+    c = seen([row(k, hold_s=0.0 if k % 2 else 10.0, temperature_C=0.0 if k < 2 else 20.0) for k in range(4)]).conditions
+    assert c.hold_s.tolist() == [10.0, 0.0, 10.0, 0.0]
+    assert c.temperature_C.tolist() == [0.0, 0.0, 20.0, 20.0]
+    assert not c.gaps

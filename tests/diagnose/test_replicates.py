@@ -9,7 +9,7 @@ import pytest
 
 from tribo.diagnostics.contrasts import screen
 from tribo.diagnostics.fit import fit
-from tribo.diagnostics.model import setup
+from tribo.diagnostics.model import PATTERN, setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit, refits, standardised
@@ -21,7 +21,11 @@ from .test_screen import baseline
 
 
 def test_a_batch_of_replicates_contrasts_like_each_fitted_by_itself() -> None:
-    """The strongest contrast of a replicate is within 5 % of that of the full fit of the same campaign."""
+    """The strongest contrast of a replicate is within 5 % of that of the full fit of the same campaign.
+
+    Where a campaign drifts by chance, the full fit goes on to find the size of the drift, which a batch does not wait
+    for: there the contrast is stronger in the batch, so that chance is not understated.
+    """
     f = baseline()
     contrasts = contrasts_of(f)
     ends = np.cumsum([contrast.freedom for contrast in contrasts])
@@ -31,11 +35,16 @@ def test_a_batch_of_replicates_contrasts_like_each_fitted_by_itself() -> None:
     # the law takes the adhesion up at its own parameters alone; what is whole or absent is not tested so here
     alone = np.array([c.freedom == 1 and c.about_one == 0 and c.covariate != "tau0" for c in contrasts])
     batch = np.sqrt(scores(refit(f, drawn), ready)[0][:, alone].max(axis=1))
+    still = []
     for k, log_force in enumerate(f.predicted + drawn.transpose(0, 2, 1)):
         again = replace(f.setup, observations=replace(f.setup.observations, log_force=log_force))
         refitted, rng = fit(again, start=replace(f, setup=again)), np.random.default_rng(0)
-        single = screen(refitted, contrasts, replicates=0, rng=rng)
-        assert batch[k] == pytest.approx(single.strength[alone].max(), rel=0.05)
+        single = screen(refitted, contrasts, replicates=0, rng=rng).strength[alone].max()
+        still.append(refitted.noise.sizes[PATTERN + 1 :].max() < 0.01)
+        assert batch[k] > 0.95 * single
+        if still[-1]:
+            assert batch[k] == pytest.approx(single, rel=0.05)
+    assert sum(still) >= 4
 
 
 def test_the_null_is_simulated_from_the_fitted_model() -> None:

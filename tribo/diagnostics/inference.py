@@ -261,8 +261,8 @@ NUISANCE_STEPS = np.linspace(-2.0, 1.0, 7)  # of the logarithm of a size about i
 
 
 def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
-    """Days, drift of the series and drift of the specimens that are beyond chance, each with its size: the root mean
-    square in percent of what it adds to T over the tests of the campaign, about its mean, with a 90 % interval.
+    """Days, drift of the series and drift of the specimens that are beyond chance, each with its size: a hundred times
+    the root mean square of what it adds to ln T over the tests of the campaign, about its mean, with a 90 % interval.
 
     The chance is that of a likelihood ratio with the sizes of both regimes free or held still. The interval is that of
     the random effects given the campaign, averaged over their sizes.
@@ -278,7 +278,7 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
         if p >= level:
             continue
         drawn = np.concatenate([_realised(g, here, int(DRAWS * share), rng) for g, share in _over_sizes(f, here)])
-        low, middle, high = 100.0 * np.expm1(np.quantile(drawn, (0.05, 0.5, 0.95)))
+        low, middle, high = 100.0 * np.quantile(drawn, (0.05, 0.5, 0.95))
         layers.append(
             Layer(
                 kind="nuisance", name=name, samples=(), regimes=tuple(REGIMES), p_adjusted=p,
@@ -358,18 +358,22 @@ def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | 
 
 
 def gain_on_sessions(before: ModelFit, after: ModelFit) -> tuple[float, float]:
-    """What ``after`` gains over ``before`` in log score per test on whole sessions left out, and its standard error
-    between sessions; NaN where there are fewer than three."""
-    session = session_of(after.setup.observations.conditions)
+    """What ``after`` gains over ``before`` on whole sessions left out: :func:`gain_on_groups`."""
+    return gain_on_groups(before, after, session_of(after.setup.observations.conditions))
+
+
+def gain_on_groups(before: ModelFit, after: ModelFit, group: NDArray[np.int64]) -> tuple[float, float]:
+    """What ``after`` gains over ``before`` in log score per test on whole groups (n,) left out, and its standard error
+    between groups; NaN where there are fewer than three."""
     gained = []
-    for number in np.unique(session) if session.max() > 1 else ():
-        out = session == number
+    for number in np.unique(group) if len(np.unique(group)) > 2 else ():
+        out = group == number
         without, extended = _held_out(before, out), _held_out(after, out)
         if without is not None and extended is not None:
             gained.append(float(np.sum(extended[0] - without[0])))
     if len(gained) < 3:
         return float("nan"), float("nan")
-    return float(np.sum(gained)) / len(session), float(np.std(gained, ddof=1) * np.sqrt(len(gained))) / len(session)
+    return float(np.sum(gained)) / len(group), float(np.std(gained, ddof=1) * np.sqrt(len(gained))) / len(group)
 
 
 def _folds(s: Setup, acting: Sequence[Acting]) -> tuple[str, np.ndarray]:

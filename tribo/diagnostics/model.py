@@ -15,14 +15,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.observations import Observations, along_specimens, sessions, walks
+from tribo.diagnostics.observations import BENT, Observations, along_specimens, sessions, walks
 from tribo.diagnostics.predictor import Predictor
 from tribo.display import displayed
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism
 from tribo.records import FloatArray
 
-OF_A_SPECIMEN = 6  # gain, slope with the load and drift along its pulls, alike in both regimes and apart
+# Gain, slope with the load and drift along its pulls, alike in both regimes and apart; the bend of its drift, alike.
+OF_A_SPECIMEN = 7
 
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
@@ -76,7 +77,7 @@ class Acting:
 class Setup:
     """What every model of one campaign shares: shares, the design of the random effects, what the repeats depend on.
 
-    ``specimen`` (n,) is the number of the specimen of every test, below ``specimens``, and ``own`` (n, 2, 6) are the
+    ``specimen`` (n,) is the number of the specimen of every test, below ``specimens``, and ``own`` (n, 2, 7) are the
     columns of its random effects, without the zeros of all specimens that a test was not made on; ``shared`` (n, 2, c)
     are those that tests of several specimens show. A vector of all q effects holds those of the specimens one after the
     other, then the shared ones. The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
@@ -173,8 +174,10 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
     log_p = np.log(c.pressure_Pa)
     log_p = log_p - log_p.mean()
     names, specimen = np.unique(c.specimen, return_inverse=True)
-    shapes = [(np.ones(o.n), GAIN), (log_p, SLOPE), (along_specimens(c), SPECIMEN_DRIFT)]
+    along, bend = along_specimens(c)
+    shapes = [(np.ones(o.n), GAIN), (log_p, SLOPE), (along, SPECIMEN_DRIFT)]
     kinds = [(shape[:, None] * r, group + k) for k, r in enumerate((ALIKE_IN_BOTH, APART)) for shape, group in shapes]
+    kinds.append((BENT * bend[:, None] * ALIKE_IN_BOTH, SPECIMEN_DRIFT))
     own = np.stack([column for column, _ in kinds], axis=2)
     columns: list[FloatArray] = []
     units, groups = [1.0] * (len(kinds) * len(names)), [group for _, group in kinds] * len(names)

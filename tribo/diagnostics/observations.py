@@ -276,6 +276,7 @@ def _slope_before(trace: Trace | None, pull: Pull) -> float:
 
 BREAK_S = 3 * 3600.0  # without a pull: another session begins
 FEWEST_IN_SESSION = 3.0  # pulls on average: below, sessions are not told from repeats
+BENT = 0.5  # size of the bend of a drifting specimen over that of its line: as of the first two terms of a walk
 WALK_TERMS = 14  # of the expansion of a random walk: it is followed down to a fourteenth of the series
 
 
@@ -321,15 +322,21 @@ def walks(c: Conditions) -> list[tuple[FloatArray, float]]:
     return [(np.sqrt(2.0) * np.cos(np.pi * k * place), float(s)) for k, s in zip(order, sd, strict=True)]
 
 
-def along_specimens(c: Conditions) -> FloatArray:
-    """Where every test lies among the pulls of its specimen, (n,): about a mean of zero with a root mean square of one
-    for each specimen; zero where the order is not known."""
-    found = np.zeros(len(c.sample))
+def along_specimens(c: Conditions) -> tuple[FloatArray, FloatArray]:
+    """Where every test lies among the pulls of its specimen, and the parabola of that beside the line, (n,) each: about
+    a mean of zero with a root mean square of one for each specimen; zero where the order is not known."""
+    line, parabola = np.zeros(len(c.sample)), np.zeros(len(c.sample))
     if not np.isfinite(c.specimen_run).all():
-        return found
+        return line, parabola
     for name in np.unique(c.specimen):
         here = c.specimen == name
         x = c.specimen_run[here] - c.specimen_run[here].mean()
-        spread = float(np.sqrt(np.mean(x**2)))
-        found[here] = x / spread if spread > 0 else 0.0
-    return found
+        line[here] = x = _of_one_size(x)
+        square = x**2 - np.mean(x**2)
+        parabola[here] = _of_one_size(square - np.mean(square * x) * x)
+    return line, parabola
+
+
+def _of_one_size(x: FloatArray) -> FloatArray:
+    size = float(np.sqrt(np.mean(x**2)))
+    return np.asarray(x / size if size > 1e-9 else np.zeros_like(x))

@@ -23,7 +23,7 @@ Nuisance = Literal["days", "drift", "specimen_drift"]
 Why = Literal[
     "zero subtracted", "absorbed", "hidden", "not varied", "not certain", "only in traces", "wrong sign",
     "explains less", "a law explains more", "not printed", "contradicted", "only with the load", "vary together",
-    "recorded in part",
+    "recorded in part", "nothing left beside a law",
 ]  # fmt: skip
 UNTESTED: frozenset[Why] = frozenset(
     {"absorbed", "hidden", "not varied", "only in traces", "not printed", "only with the load", "vary together",
@@ -126,7 +126,7 @@ class Layer:
     ``over`` says, of a cause that follows a recorded column, by how much T changes from its lowest to its highest
     recorded values: the ``column``, the values ``from`` and ``to``, and the change in ``percent`` from ``low`` to
     ``high``. ``levels`` are the values of a column of few, each with the change of T there relative to its mean over
-    them (percent).
+    them (percent); of a law that is a curve, places along it, relative to its mean over the tests.
     """
 
     kind: LayerKind

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
+from tribo.diagnostics.candidates import judged, refitted
 from tribo.diagnostics.contrasts import screen_left
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
@@ -54,6 +55,12 @@ def with_laws(
     settled = {name for law, told in answers if told.answer == "held" for name in law.law.columns}
     level, of_nuisance = d.share_of_level * level, level
     found = discover_laws(with_known, level=LEVEL_OF_LAWS * level, rng=rng, progress=progress, without=settled)
+    idle_beside: tuple[str, ...] = ()
+    if found.laws and (idle := _explained_by_laws(d, found.laws[-1].model, level)):
+        without = refitted(with_known, [a for a in with_known.acting if a.name not in idle])
+        again = discover_laws(without, level=LEVEL_OF_LAWS * level, rng=rng, progress=progress, without=settled)
+        if again.laws:
+            found, with_known, idle_beside = again, without, idle
     found = replace(found, of_causes=forms)
     if not found.laws and not held:
         return replace(d, laws=found)
@@ -61,14 +68,15 @@ def with_laws(
     allowed = len(with_known.acting) if found.laws else 0
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress, allowed=allowed)
     gone = {**(lost if found.laws else {}), **replaced}
-    verdict = with_misfits(without_causes(d.verdict, gone), found)
     explained_by_laws = settled | {name for law in found.laws for name in law.law.columns}
     if "clock_h" in explained_by_laws:
         explained_by_laws.add("time of day")  # its name among the contrasts
     open_columns = {
         contrast.column for contrast, p in zip(left.contrasts, left.p, strict=True)
-        if p < level and contrast.kind != "mechanism" and contrast.column not in explained_by_laws
+        if p < level and contrast.kind != "mechanism"
     }  # fmt: skip
+    verdict = with_misfits(without_causes(d.verdict, gone, idle_beside), found, explained_by_laws - open_columns)
+    open_columns -= explained_by_laws
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
         *(x for x in verdict.layers if x.kind == "remainder" and x.name in open_columns),
@@ -146,18 +154,37 @@ def with_levels_of_causes(v: Verdict, model: ModelFit) -> Verdict:
     return replace(v, layers=layers)
 
 
-def with_misfits(v: Verdict, found: Discovery) -> Verdict:
-    """The verdict with the laws found as its misfits, where it had none beside its causes."""
-    outcome = AS_MISFIT.get(v.verdict)
-    if outcome is None or not found.laws:
+def with_misfits(v: Verdict, found: Discovery, told: Collection[str] = ()) -> Verdict:
+    """The verdict with the laws found as its misfits, in place of those of the columns that they ``told`` all about."""
+    if not found.laws:
+        return v
+    outcome = AS_MISFIT.get(v.verdict, v.verdict)
+    kept = tuple(m for m in v.misfits if m.covariate not in told)
+    if outcome == v.verdict and len(kept) == len(v.misfits):
         return v
     misfits = []
     for f in found.laws:
         value, low, high = f.effect_percent
         name = " and ".join(f.law.columns)
         misfits.append(Misfit(f.law.regime, f.law.sample, name, value, f.p, low=low, high=high, shows=f))
+    if outcome == v.verdict:
+        return replace(v, misfits=(*misfits, *kept))
     next_test = v.next_test if v.equivalent else first_test_of(misfits[0].covariate)
-    return replace(v, verdict=outcome, misfits=(*v.misfits, *misfits), next_test=next_test)
+    return replace(v, verdict=outcome, misfits=(*kept, *misfits), next_test=next_test)
+
+
+def _explained_by_laws(d: Diagnosis, model: ModelFit, level: float) -> tuple[str, ...]:
+    """The causes of a diagnosis that are within chance beside the laws of a model."""
+    causes = {layer.name for layer in d.verdict.layers if layer.kind == "cause"}
+    idle = []
+    for acting in model.acting:
+        if acting.name in causes:
+            others = [a for a in model.acting if a is not acting]
+            without = refitted(model, others)
+            beside = judged(without, refitted(without, [*others, acting]), 0.0)
+            if d.screened.p_library(beside.strength) >= level:
+                idle.append(acting.name)
+    return tuple(idle)
 
 
 def law_layers(d: Discovery) -> list[Layer]:
@@ -171,18 +198,22 @@ def law_layers(d: Discovery) -> list[Layer]:
     ]  # fmt: skip
 
 
-def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
-    """The verdict without the causes that a law replaces; they are excluded with the reason.
+def without_causes(v: Verdict, lost: Mapping[str, float], idle: Collection[str] = ()) -> Verdict:
+    """The verdict without the causes that ``lost`` to a law, each by a log likelihood, and without those to which laws
+    leave nothing to explain, ``idle``; they are excluded with the reason.
 
     What could not be told from such a cause goes with it.
     """
-    if not lost:
+    left_out = {*lost, *idle}
+    if not left_out:
         return v
-    gone = set(lost) | {n for names in v.equivalent if set(names) & set(lost) for n in names} | _alternatives(v, lost)
+    tied = {n for names in v.equivalent if set(names) & left_out for n in names}
+    gone = left_out | tied | _alternatives(v, left_out)
     causes = tuple(c for c in v.causes if c.mechanism not in gone)
     outcome: Outcome = "partly" if causes else "unknown"
     equivalent = tuple(names for names in v.equivalent if not set(names) & gone)
     excluded = [Excluded(name, "a law explains more", by) for name, by in lost.items()]
+    excluded += [Excluded(name, "nothing left beside a law") for name in idle]
     layers = tuple(layer for layer in v.layers if not (layer.kind == "cause" and layer.name in gone))
     return replace(
         v, verdict=outcome, causes=causes, equivalent=equivalent, excluded=(*v.excluded, *excluded), layers=layers,
@@ -190,7 +221,7 @@ def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
     )  # fmt: skip
 
 
-def _alternatives(v: Verdict, lost: Mapping[str, float]) -> set[str]:
+def _alternatives(v: Verdict, lost: Collection[str]) -> set[str]:
     """Mechanisms of an undetermined verdict that stand for its last cause, where that one is lost: causes alone have a
     layer."""
     layers = [{layer.name, *layer.tied_with} for layer in v.layers if layer.kind == "cause"]

@@ -45,7 +45,8 @@ class Shape:
     -exp(-(x - low) / width), from ``low`` upwards or, with a negative ``width``, downwards; ``window`` is 1 from
     ``place`` to ``place`` + ``width``; ``wave`` is sin and cos of the period ``width``; ``log optimum`` is a parabola
     of the logarithm; ``level`` is 1 where a column of names has the value ``level``, or one of numbers the value
-    ``place``; ``levels`` is 1 at the second of the ``values`` of a column, 1 at the third, and so on: a column each.
+    ``place``; ``levels`` is 1 at the second of the ``values`` of a column, 1 at the third, and so on: a column each;
+    ``curve`` has the ``heights`` at the ``values`` of a column, and runs straight from one to the next.
     """
 
     kind: str
@@ -56,6 +57,7 @@ class Shape:
     width: float = float("nan")
     level: str = ""
     values: tuple[float | str, ...] = ()
+    heights: tuple[float, ...] = ()
 
     @property
     def zero(self) -> float:
@@ -95,6 +97,8 @@ class Shape:
         if self.kind == "log optimum":
             half = max(np.log(self.high / self.place), np.log(self.place / self.low))
             return (-((np.log(np.maximum(x, 1e-300) / self.place) / half) ** 2))[:, None]
+        if self.kind == "curve":
+            return np.interp(x, np.array(self.values, float), self.heights)[:, None]
         if self.kind == "linear":
             return ((x - self.zero) / (self.high - self.low))[:, None]
         if self.kind == "log":
@@ -126,8 +130,9 @@ class WrittenLaw:
 
     Without shapes it is a scope: what laws act on, in which regime and where.
 
-    ``where`` is ALL, PATTERNED, FLAT, the name of a sample after "sample ", or a property of the pattern in proportion
-    to which it acts (CAVITY_SHARE, RIM, ELONGATION; the latter two over ``where_scale``).
+    ``where`` is ALL, PATTERNED, FLAT, the name of a sample after "sample ", of several after "samples " with " + "
+    between them, or a property of the pattern in proportion to which it acts (CAVITY_SHARE, RIM, ELONGATION; the latter
+    two over ``where_scale``).
     """
 
     shapes: tuple[Shape, ...]
@@ -163,6 +168,8 @@ class WrittenLaw:
         patterned = c.area_fraction < 1.0
         if self.where.startswith("sample "):
             return np.asarray(c.sample == self.where.removeprefix("sample "), float)
+        if self.where.startswith("samples "):
+            return np.asarray(np.isin(c.sample, self.where.removeprefix("samples ").split(" + ")), float)
         return np.asarray(
             {
                 ALL: np.ones(len(patterned)), PATTERNED: patterned * 1.0, FLAT: ~patterned * 1.0,
@@ -242,6 +249,8 @@ def _formula(s: Shape) -> str:
         return f"1 / (1 + exp(-({x} - {s.place:.4g}) / {s.width:.4g}))"
     if s.kind == "window":
         return f"[{s.place:.4g} <= {x} <= {s.place + s.width:.4g}]"
+    if s.kind == "curve":
+        return f"curve({x})"
     if s.kind == "log optimum":
         half = max(math.log(s.high / s.place), math.log(s.place / s.low))
         return f"(-(ln({x} / {s.place:.4g}) / {half:.4g})^2)"
@@ -278,6 +287,8 @@ FEWEST_HOURS = 2.0  # of the day in which pulls were made: a shorter time has no
 WIDE = 3.0  # ratio of the largest to the smallest value above which a logarithm differs from a line
 LEVELS = 12  # names of a column that may each have an effect of its own
 CYCLES = 12  # of a wave over the series
+# columns without waves: those of the series are periods of the run order
+WITHOUT_WAVES = {"pressure_Pa", "contact_pressure_Pa", "specimen_run", "elapsed_s"}
 TENTHS = 10  # of the series: ends of its stretches
 WIDTHS = (30.0, 22.0, 16.0, 12.0, 9.0, 7.0, 5.5, 4.0)  # of humps, by how much less than the range
 SOFT = (120.0, 60.0, 40.0, 28.0, 20.0, 14.0, 10.0)  # the same of soft steps
@@ -348,8 +359,9 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
             yield from (Shape("soft step", name, low, high, place=float(p), width=(high - low) / k) for k in (40, 15))
         for p in np.quantile(x, np.arange(1, 8) / 8):
             yield from (Shape("hump", name, low, high, place=float(p), width=(high - low) / k) for k in (16, 8, 4))
-    if name == "run_order" and len(distinct) > 18:
+    if len(distinct) > 18 and name not in WITHOUT_WAVES:
         yield from _waves(name, low, high, 0.5)
+    if name == "run_order" and len(distinct) > 18:
         yield from _windows(name, low, high, TENTHS)
 
 
@@ -360,9 +372,11 @@ def _hours_between(hours: FloatArray) -> FloatArray:
 
 
 def _waves(name: str, low: float, high: float, step: float) -> Iterator[Shape]:
-    """Periods of whole steps of the turns: in the series, up to so many; in one day, up to three."""
-    whole, most = (DAY_H, 3.0) if name == "clock_h" else (high - low + 1, CYCLES - 0.5)
-    turns = np.arange(1.0, most + 0.5 * step, step)
+    """Periods of whole steps of the turns: in the series, up to so many; in one day, up to three; over the range of any
+    other column, from one and a half to five."""
+    ranges = {"clock_h": (DAY_H, 1.0, 3.0), "run_order": (high - low + 1, 1.0, CYCLES - 0.5)}
+    whole, least, most = ranges.get(name, (high - low, 1.5, 5.0))
+    turns = np.arange(least, most + 0.5 * step, step)
     yield from (Shape("wave", name, low, high, width=float(whole / k)) for k in turns)
 
 
@@ -391,7 +405,7 @@ def _windows(name: str, low: float, high: float, parts: int) -> Iterator[Shape]:
 
 def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """The shapes of the same kind on the same column with places and widths on a fine grid."""
-    if s.kind in ("linear", "log", "level", "levels") or (s.kind == "wave" and s.column == "clock_h"):
+    if s.kind in ("linear", "log", "level", "levels", "curve") or (s.kind == "wave" and s.column == "clock_h"):
         return [s]  # a day has 24 hours
     x = recorded_values(c, s.column)
     low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
@@ -473,12 +487,25 @@ def scopes_of(c: Conditions) -> tuple[tuple[WrittenLaw, ...], FloatArray]:
                 if acts_on == T or where in (ALL, PATTERNED):
                     found.append(WrittenLaw((), acts_on, regime, where, scale))
                     costs.append(chosen + cost if acts_on == T else chosen + cost + float(np.log(2)))
+        sets = _sets_of_samples(c)
+        found += [WrittenLaw((), T, regime, each) for each in sets]
+        costs += [chosen + float(np.log(len(places) + len(sets)))] * len(sets)
     return tuple(found), np.array(costs)
+
+
+def _sets_of_samples(c: Conditions) -> list[str]:
+    """Every two samples alone, and all but every one, where that is no other place."""
+    names = [str(name) for name in np.unique(c.sample)]
+    if len(names) < 3 or any(" + " in name for name in names):
+        return []
+    patterned = frozenset(np.unique(c.sample[c.area_fraction < 1.0]).tolist())
+    sets = dict.fromkeys([*combinations(names, len(names) - 1), *combinations(names, 2)])
+    return [f"samples {' + '.join(each)}" for each in sets if frozenset(each) != patterned]
 
 
 def corrects_a_pattern(scopes: Sequence[WrittenLaw], shapes: Sequence[tuple[Shape, ...]]) -> NDArray[np.bool_]:
     """Which laws, (scopes, shapes), follow the pressure alone on one sample, or by the elongation, which two samples
     have at most: no laws of their own, since they say how wrong the model is about that pattern."""
-    one = np.array([scope.where == ELONGATION or scope.where.startswith("sample ") for scope in scopes])
+    one = np.array([scope.where == ELONGATION or scope.where.startswith("sample") for scope in scopes])
     pressure_alone = np.array([{s.column for s in each} <= PRESSURES for each in shapes], bool)
     return one[:, None] & pressure_alone

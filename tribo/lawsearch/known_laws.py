@@ -30,6 +30,7 @@ from tribo.mechanisms.record import Conditions
 from tribo.records import REGIMES, Campaign
 
 SCHEMA = "tribo.law/1"
+MOST_KNOTS = 100  # of a curve
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -61,13 +62,15 @@ class ShapeTable(_Strict):
     place: Finite | None = None
     width: Finite | None = None
     level: str = ""
-    values: list[Finite | str] = Field(default=[], max_length=MOST_VALUES)
+    values: list[Finite | str] = Field(default=[], max_length=MOST_KNOTS)
+    heights: list[Finite] = Field(default=[], max_length=MOST_KNOTS)
 
     def shape(self) -> Shape:
         nan = float("nan")
         place = nan if self.place is None else self.place
         width = nan if self.width is None else self.width
-        return Shape(self.kind, self.column, self.low, self.high, place, width, self.level, tuple(self.values))
+        listed = tuple(self.values), tuple(self.heights)
+        return Shape(self.kind, self.column, self.low, self.high, place, width, self.level, *listed)
 
 
 class ParameterTable(_Strict):
@@ -95,9 +98,17 @@ class LawTable(_Strict):
     @model_validator(mode="after")
     def _has_amplitudes(self) -> LawTable:
         shape = self.shape[0]
-        if (shape.kind == "levels") != (len(shape.values) > 1):
-            raise ValueError("levels, and they alone, have two values or more")
-        wanted = 2 if shape.kind == "wave" else max(len(shape.values) - 1, 1)
+        if (shape.kind in ("levels", "curve")) != (len(shape.values) > 1):
+            raise ValueError("levels and curves, and they alone, have two values or more")
+        if shape.kind == "levels" and len(shape.values) > MOST_VALUES:
+            raise ValueError(f"levels are at most {MOST_VALUES} values")
+        for each in self.shape:
+            if len(each.heights) != (len(each.values) if each.kind == "curve" else 0):
+                raise ValueError("a curve, and nothing else, has a height at each of its values")
+            numbers = [v for v in each.values if isinstance(v, float)]
+            if each.kind == "curve" and (numbers != sorted(set(numbers)) or len(numbers) < len(each.values)):
+                raise ValueError("the values of a curve are numbers, each larger than the one before")
+        wanted = 2 if shape.kind == "wave" else len(shape.values) - 1 if shape.kind == "levels" else 1
         if missing := [name for name in AMPLITUDES[:wanted] if name not in self.parameters]:
             raise ValueError(f"[parameters.{missing[0]}] is missing")
         return self
@@ -120,6 +131,7 @@ def law_text(law: WrittenLaw, parameters: Mapping[str, Estimate], found_in: str)
         lines += [f"{name} = {value!r}" for name, value in (("place", s.place), ("width", s.width)) if value == value]
         lines += [f"level = {quoted(s.level)}"] if s.level else []
         lines += [f"values = {json.dumps(list(s.values))}"] if s.values else []
+        lines += [f"heights = {json.dumps(list(s.heights))}"] if s.heights else []
     for name, e in parameters.items():
         lines += ["", f"[parameters.{name}]", f"value = {e.value!r}", f"low = {e.low!r}", f"high = {e.high!r}"]
         lines += [f"unit = {quoted(e.unit)}"]

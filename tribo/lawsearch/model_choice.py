@@ -22,6 +22,7 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import estimates, gain, informed_share
 from tribo.diagnostics.model import Acting, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
+from tribo.lawsearch.free_curves import KNOTS, FreeCurve, better_left_out, curve_of, fitted_curve
 from tribo.lawsearch.grammar import (
     BOTH,
     LOAD_TERM,
@@ -46,6 +47,8 @@ from tribo.vocabulary import COLUMNS
 CLOSE = 3.0  # log likelihood within which laws cannot be told apart: odds of 20 to 1
 IN_REACH = 8.0  # below the best on the coarse grid, within which a form is looked at on the fine one
 LOOKED_AT = 40  # forms at most on the fine grid
+MOST_IN_BAND = 8  # forms whose changes make up a band
+TOLD = 7  # places along a curve at which a law is told
 WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
 CONTRADICTED = 0.05  # chance of a formula that fits the values of a column worse, if it is true
 PLACED = ("step", "soft step", "ramp", "optimum", "log optimum", "hump", "window")  # kinds with a place
@@ -122,6 +125,12 @@ class Background:
     def conditions(self) -> Conditions:
         return self.setup.observations.conditions
 
+    def curve(self, scope: WrittenLaw, shape: Shape, formula: Shape | None = None) -> FreeCurve:
+        """The curve in one scope, alone or beside a formula."""
+        without = replace(self.without, residual=self.residual)
+        law = replace(scope, shapes=(shape,))
+        return fitted_curve(without, (law, self.effects(scope)[0]), shape, self.informed, formula)
+
     def effects(self, *scopes: WrittenLaw) -> FloatArray:
         return effects_of(scopes, self.conditions, self.terms)
 
@@ -173,6 +182,9 @@ def choose_form(
     background, forms = _best_forms(model, grammar, first)
     if levels := levels_of_law(forms[0].best, background.conditions):
         return _by_levels(model, replace(forms[0].scope, shapes=(levels,)), p, rng)
+    curve = _likeliest_curve(background, forms, grammar)
+    if curve is not None and better_left_out(model, background.after, curve):
+        return _by_curve(model, curve, p, rng)
     after, form = background.after, forms[0]
     parameters = estimates(after, len(after.acting) - 1) | _place_and_width(form)
     wider = 1.0
@@ -186,6 +198,56 @@ def choose_form(
         tuple(f.best for f in forms[1:] if f.evidence > form.evidence - CLOSE), after,
         _band(background, forms, wider),
     )  # fmt: skip
+
+
+def _likeliest_curve(at: Background, forms: Sequence[Form], grammar: Grammar) -> FreeCurve | None:
+    """The likeliest curve, of the columns, regimes and samples of the forms in reach; None where the best form is a law
+    of two columns, or of one that has no curves."""
+    if len(forms[0].best.columns) > 1 or curve_of(forms[0].best.columns[0], at.conditions) is None:
+        return None
+    cost = dict(zip(grammar.scopes, grammar.scope_cost.tolist(), strict=True))
+    tried: dict[tuple[str, WrittenLaw], FreeCurve] = {}
+    for form in forms:
+        column, *others = form.best.columns
+        shape = curve_of(column, at.conditions) if not others else None
+        if shape is not None and (column, form.scope) not in tried:
+            tried[column, form.scope] = at.curve(form.scope, shape)
+    return max(tried.values(), key=lambda curve: curve.evidence - cost[replace(curve.law, shapes=())], default=None)
+
+
+def _by_curve(model: ModelFit, curve: FreeCurve, p: float, rng: np.random.Generator) -> FoundLaw:
+    """A law that no formula tells as well: its course with a band, and what friction does along it."""
+    heights = curve.heights
+    low, high = int(heights.argmin()), int(heights.argmax())
+    shape = replace(curve.law.shapes[0], heights=tuple(float(h) for h in heights / np.ptp(heights)))
+    at = Background(model, replace(curve.law, shapes=(shape,)))
+    after = at.after
+    parameters = estimates(after, len(after.acting) - 1)
+    last = after.columns.parameters - 1
+    a, sd = parameters["a"], float(np.sqrt(after.inverse.border[0][last, last] / at.informed))
+    wider = max((a.high - a.low) / (2.0 * NORMAL_90) / sd, 1.0)
+    full = float(np.abs(curve.law.weight(at.conditions)).max())
+    covariance = curve.covariance * (wider * full) ** 2
+    apart = np.zeros(KNOTS)
+    apart[[high, low]] = 1.0, -1.0
+    (effect,) = _percents(np.array([apart @ heights * full]), (apart @ covariance @ apart).reshape(1, 1))
+    told = np.linspace(0, KNOTS - 1, TOLD).round().astype(int)
+    each = _percents(heights[told] * full, covariance[np.ix_(told, told)])
+    levels = {_as_read(shape.column, shape.values[k]): e for k, e in zip(told, each, strict=True)}
+    mean, spread = _beyond_patterns(at, curve)
+    half = NORMAL_90 * wider * np.sqrt(spread)
+    return FoundLaw(
+        at.law, parameters, (effect.value, effect.low, effect.high), p, gain(model, after, rng), (), after,
+        np.stack([mean, mean - half, mean + half]), levels,
+    )  # fmt: skip
+
+
+def _beyond_patterns(at: Background, curve: FreeCurve) -> tuple[FloatArray, FloatArray]:
+    """The change of ln T of every test by a curve and the formula beside it, beyond what flat law and patterns can
+    absorb, and its variance, (n, 2) each."""
+    each = [centred(curve.columns[:, :, k], at.conditions, at.terms[LOAD_TERM]) for k in range(len(curve.value))]
+    beyond = np.stack(each, axis=2)
+    return beyond @ curve.value, np.maximum(np.einsum("nri,ij,nrj->nr", beyond, curve.covariance, beyond), 0.0)
 
 
 def levels_of_law(law: WrittenLaw, c: Conditions) -> Shape | None:
@@ -437,29 +499,46 @@ def _percent(
 def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
     """The mean change by all laws in proportion to their likelihood, with its spread, (3, n, 2).
 
-    A law may be wrong in form by the same share of its own effect as a mechanism.
+    No law is exactly of the grammar. A formula of one column has a curve beside it, as large as the campaign leaves
+    open; any other may be wrong by the same share of its own effect as a mechanism.
     """
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
-    for form in forms:
+    for form in forms[:MOST_IN_BAND]:
         if form.evidence < forms[0].evidence + np.log(WEIGHTLESS):
             continue
         share = float(np.exp(form.evidence - forms[0].evidence))
-        effects, amplitudes = at.effects(form.scope)[0], _amplitudes(at, form)
-        for k in np.flatnonzero(form.weight > WEIGHTLESS * form.weight.max()):
-            changes = [
-                (centred(columns[:, k, None] * effects, at.conditions, at.terms[LOAD_TERM]), a[k], variance[k])
-                for columns, a, variance in amplitudes
-            ]
-            whole = np.sum([a * g for g, a, _ in changes], axis=0)
-            weight = share * form.weight[k]
-            mean += weight * whole
-            square += weight * (whole**2 + wider**2 * np.sum([v * g**2 for g, _, v in changes], axis=0))
-            total += weight
+        whole, spread = _change_by_form(at, form, wider)
+        mean += share * whole
+        square += share * (whole**2 + spread)
+        total += share
     mean, square = mean / total, square / total
-    wrong = FORM * np.sqrt(np.mean(mean[mean != 0] ** 2)) * (mean != 0)  # the form is none of the grammar exactly
-    half = NORMAL_90 * np.sqrt(np.maximum(square - mean**2, 0.0) + wrong**2)
+    half = NORMAL_90 * np.sqrt(np.maximum(square - mean**2, 0.0))
     return np.stack([mean, mean - half, mean + half])
+
+
+def _change_by_form(at: Background, form: Form, wider: float) -> tuple[FloatArray, FloatArray]:
+    """The change of ln T of every test by the laws of a form, and its variance, (n, 2) each."""
+    best = form.best.shapes[0]
+    curve = curve_of(best.column, at.conditions) if len(form.best.shapes) == 1 else None
+    if curve is not None:
+        mean, spread = _beyond_patterns(at, at.curve(form.scope, curve, best))
+        return mean, wider**2 * spread
+    n = len(at.conditions.sample)
+    mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
+    effects, amplitudes = at.effects(form.scope)[0], _amplitudes(at, form)
+    for k in np.flatnonzero(form.weight > WEIGHTLESS * form.weight.max()):
+        changes = [
+            (centred(columns[:, k, None] * effects, at.conditions, at.terms[LOAD_TERM]), a[k], variance[k])
+            for columns, a, variance in amplitudes
+        ]
+        whole = np.sum([a * g for g, a, _ in changes], axis=0)
+        mean += form.weight[k] * whole
+        square += form.weight[k] * (whole**2 + wider**2 * np.sum([v * g**2 for g, _, v in changes], axis=0))
+        total += form.weight[k]
+    mean, square = mean / total, square / total
+    wrong = FORM * np.sqrt(np.mean(mean[mean != 0] ** 2)) * (mean != 0)
+    return mean, np.maximum(square - mean**2, 0.0) + wrong**2
 
 
 def centred(change: FloatArray, c: Conditions, load_share: FloatArray) -> FloatArray:

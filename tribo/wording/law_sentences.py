@@ -27,6 +27,11 @@ WHERE = {
 
 def law_sentence(found: FoundLaw) -> str:
     """What follows what, where, in which regime and by how much."""
+    if found.law.shapes[0].kind == "curve":
+        return (
+            f"{curve_sentence(found.law, found.levels)} (adjusted p {p_text(found.p)}). No formula that was tried "
+            "predicts tests that were left out as well as this curve."
+        )
     if found.levels:
         return f"{level_sentence(found.law, found.levels)} (adjusted p {p_text(found.p)})."
     said = size_sentence(found.law, found.parameters, found.effect_percent)
@@ -40,12 +45,20 @@ def level_sentence(law: WrittenLaw, levels: Mapping[str, Estimate]) -> str:
     return f"{subject(law)} depends on {in_words(column)}: {each_value(levels, unit)}"
 
 
-def each_value(levels: Mapping[str, Estimate], unit: str = "") -> str:
+def curve_sentence(law: WrittenLaw, places: Mapping[str, Estimate]) -> str:
+    """ "Sliding friction follows the humidity along a curve: −10 % (90 % interval −12 to −8 %) at 30 %, ..."."""
+    column = law.columns[0]
+    unit = COLUMNS[column].unit if column in COLUMNS else ""
+    said = each_value(places, unit, "the mean over the tests")
+    return f"{subject(law)} follows {in_words(column)} along a curve: {said}"
+
+
+def each_value(levels: Mapping[str, Estimate], unit: str = "", to: str = "the mean over these values") -> str:
     """ "+5 % (+2 to +8 %) at 0.05 mm/s, ...", relative to what."""
     each = [
         f"{e.value:+.0f} % ({e.low:+.0f} to {e.high:+.0f} %) at {value} {unit}".rstrip() for value, e in levels.items()
     ]
-    return f"{', '.join(each)}, each relative to the mean over these values, with 90 % intervals".replace("-", "−")
+    return f"{', '.join(each)}, each relative to {to}, with 90 % intervals".replace("-", "−")
 
 
 def size_sentence(
@@ -56,6 +69,9 @@ def size_sentence(
     size = f"{value:+.0f} %, 90 % interval {low:+.0f} to {high:+.0f} %"
     if law.shapes[0].kind == "levels":
         return f"{subject(law)} changes with {in_words(law.columns[0])} from value to value by up to {size}"
+    if law.shapes[0].kind == "curve":
+        column = in_words(law.columns[0])
+        return f"{subject(law)} follows {column} along a curve; highest relative to lowest: {size}"
     if law.shapes[0].kind == "wave":
         return f"{subject(law)} {_wave(law.shapes[0])}; highest relative to lowest: {size}"
     return f"{subject(law)} {'is higher' if value > 0 else 'is lower'} ({size}) {_where(law, parameters)}"
@@ -65,7 +81,7 @@ def subject(law: WrittenLaw) -> str:
     """The observable and the samples."""
     regime = "Friction" if law.regime == BOTH else f"{law.regime.capitalize()} friction"
     what = regime if law.acts_on == T else f"The {law.acts_on} of {regime.lower()}"
-    of = WHERE.get(law.where, f" of {law.where}")
+    of = WHERE.get(law.where, f" of {law.where.replace(' + ', ', ')}")
     return f"{what}{of}"
 
 

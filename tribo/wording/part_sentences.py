@@ -346,6 +346,7 @@ def why_not(e: Excluded) -> str:
         "contradicted": m.in_table.barred,
         "wrong sign": "wrong sign: it can change friction in one direction only, and the misfit has the opposite sign",
         "explains less": f"log likelihood lower by {e.by:.1f}",
+        "nothing left beside a law": "beside the law that was found, what it adds is within chance",
         "a law explains more": (
             f"a law of the same column explains the campaign better: log likelihood higher by {e.by:.1f}"
         ),
