@@ -13,6 +13,7 @@ from blind.tribometer import hide
 
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.observations import observe, place_in_series, session_of, walks
+from tribo.diagnostics.verdict import Verdict
 from tribo.wording.verdict_sentences import worded
 
 SIZE = 0.06  # of ln T, root mean square
@@ -47,17 +48,27 @@ def diagnosed(seed: int, course: Course | None, effects: tuple[tuple[str, float]
     return examine(ingested(b, seed), replicates=(60, 40))
 
 
-@pytest.mark.parametrize(
-    ("name", "course"), [("days", days), ("drift", drift), ("specimen_drift", specimen_drift)]
-)
-def test_what_moves_is_told_with_its_size_and_is_no_cause(name: str, course: Course) -> None:
-    found = {seed: diagnosed(seed, course).verdict for seed in (1, 3, 4)}
-    assert all(v.verdict == "no_misfit" and not v.causes for v in found.values())
-    layers = [layer for v in found.values() for layer in v.layers if layer.kind == "nuisance"]
+KINDS: dict[str, Course] = {"days": days, "drift": drift, "specimen_drift": specimen_drift}
+
+
+@cache
+def told(name: str) -> tuple[Verdict, ...]:
+    return tuple(diagnosed(seed, KINDS[name]).verdict for seed in (1, 3, 4))
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_what_moves_is_told_with_its_size_and_is_no_cause(name: str) -> None:
+    assert all(v.verdict == "no_misfit" and not v.causes for v in told(name))
+    layers = [layer for v in told(name) for layer in v.layers if layer.kind == "nuisance"]
     assert {layer.name for layer in layers} == {name}
     assert len(layers) == 3
-    assert sum(layer.low <= 100 * SIZE <= layer.high for layer in layers) >= 2
-    assert all(layer.effect_percent == pytest.approx(100 * SIZE, rel=0.4) for layer in layers)
+    assert all(layer.effect_percent == pytest.approx(100 * SIZE, rel=0.25) for layer in layers)
+
+
+def test_of_nine_sizes_six_at_least_lie_within_their_intervals() -> None:
+    """Nine in ten should; docs/results/laboratories.md counts them."""
+    layers = [layer for name in KINDS for v in told(name) for layer in v.layers if layer.kind == "nuisance"]
+    assert sum(layer.low <= 100 * SIZE <= layer.high for layer in layers) >= 6
 
 
 def test_the_level_is_a_tenth_only_beside_certain_days_and_drift() -> None:
