@@ -55,6 +55,7 @@ class ShapeTable(_Strict):
         "wave",
         "level",
         "levels",
+        "curve",
     ]
     column: str
     low: Finite = 0.0
