@@ -122,11 +122,23 @@ def write_rows(campaign: Path, table: list[dict[str, str]]) -> None:
 
 
 @pytest.fixture(scope="module")
-def story(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Story]:
+def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, dict[str, str]]]:
+    """What is started in place of Python, and its environment."""
+    with quick_starts(tmp_path_factory.mktemp("starts")) as serving:
+        yield serving
+
+
+@pytest.fixture(scope="module")
+def story(tmp_path_factory: pytest.TempPathFactory, started: tuple[str, dict[str, str]]) -> Story:
     """The whole story, told once; each test looks at one of its builds."""
-    drop, lab, starts, elsewhere = map(tmp_path_factory.mktemp, ("drop", "lab", "starts", "elsewhere"))
-    with quick_starts(starts) as started:
-        yield told(Lab(drop, lab / "site", *started), elsewhere)
+    drop, lab, elsewhere = map(tmp_path_factory.mktemp, ("drop", "lab", "elsewhere"))
+    return told(Lab(drop, lab / "site", *started), elsewhere)
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, started: tuple[str, dict[str, str]]) -> Lab:
+    """A drop folder and a site that are not there yet."""
+    return Lab(tmp_path / "drop", tmp_path / "site", *started)
 
 
 def told(lab: Lab, other: Path) -> Story:
@@ -258,10 +270,9 @@ def test_each_build_that_changed_something_is_kept_by_its_date(story: Story) -> 
     assert (story.lab.site / "latest").resolve() == made[-1].resolve()
 
 
-def test_a_dry_run_says_why_each_step_would_run_and_does_nothing(tmp_path: Path) -> None:
-    lab = Lab(tmp_path / "drop", tmp_path / "site")
-    small(lab.drop / "a", 0)
-    dry = lab.build("--dry-run")
+def test_a_dry_run_says_why_each_step_would_run_and_does_nothing(fresh: Lab) -> None:
+    small(fresh.drop / "a", 0)
+    dry = fresh.build("--dry-run")
     assert dry.said["due"] == {"a": "new"}
     steps = {step.split(" (")[0].split(":")[0] for step in dry.said["steps"]}
     assert steps == {"predict", "report", "index"}
@@ -269,24 +280,22 @@ def test_a_dry_run_says_why_each_step_would_run_and_does_nothing(tmp_path: Path)
     assert dry.after == {}
 
 
-def test_the_slurm_profile_is_accepted_and_runs_cell_by_cell(tmp_path: Path) -> None:
-    lab = Lab(tmp_path / "drop", tmp_path / "site")
-    small(lab.drop / "a", 0)
-    dry = lab.build("--dry-run", "--profile", "slurm")
+def test_the_slurm_profile_is_accepted_and_runs_cell_by_cell(fresh: Lab) -> None:
+    small(fresh.drop / "a", 0)
+    dry = fresh.build("--dry-run", "--profile", "slurm")
     cells = [step for step in dry.said["steps"] if step.startswith("simulate")]
     assert len(cells) == 4
     assert all("Pa)" in step for step in cells)
 
 
-def test_an_unusable_campaign_is_named_and_keeps_no_other_back(tmp_path: Path) -> None:
-    lab = Lab(tmp_path / "drop", tmp_path / "site")
-    folder = lab.drop / "broken"
+def test_an_unusable_campaign_is_named_and_keeps_no_other_back(fresh: Lab) -> None:
+    folder = fresh.drop / "broken"
     folder.mkdir(parents=True)
     (folder / "campaign.toml").write_text(SMALL_TOML.format(title="x"))
     (folder / "tests.csv").write_text("test_id,file,sample,mass_g\nT1,raw/T1.csv,F,5\n")
-    first = lab.build()
+    first = fresh.build()
     assert (first.status, first.said["status"]) == (3, {"broken": "unusable"})
     index = first.after["current/index.html"].decode()
     assert "input not usable" in index
     assert "this file does not exist" in index
-    assert lab.build().said["steps"] == []
+    assert fresh.build().said["steps"] == []
