@@ -1,15 +1,23 @@
-"""The same function over many items, on several processes where that is safe and pays."""
+"""The same function over many items, on several processes where that is safe and pays; one function with limits."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
+import selectors
+import signal
+import sys
 import threading
+import time
+import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
 from multiprocessing.connection import wait
-from typing import TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -34,6 +42,157 @@ def each(function: Callable[[T], R], items: Sequence[T], jobs: int = 1, chunk: i
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a function in a process of its own may take, its child processes included: time, and memory of each."""
+
+    minutes: float
+    gigabytes: float
+
+
+class ApartError(Exception):
+    """A process ended without a result; ``kind`` is over_time, over_memory, crashed or killed, ``what`` a sentence."""
+
+    def __init__(self, kind: str, what: str):
+        super().__init__(what)
+        self.kind, self.what = kind, what
+
+
+LOOK_S = 0.1  # how often the memory of a process is looked at
+LOOK_AROUND_S = 1.0  # how often its child processes are looked for
+ADDRESSES = 4.0  # gigabytes of addresses beyond the memory: threads and libraries reserve what they never use
+END_S = 5.0  # how long a process over its limits may take to end by itself
+
+
+def apart(function: Callable[[], R], limits: Limits) -> R:
+    """The result of a function that runs in a forked process with limits; here, where processes cannot be forked.
+
+    The process ends with this one. What the function gives has to be picklable.
+
+    Raises
+    ------
+    ApartError
+        It took longer or more memory than it may, or the process ended without a result.
+    """
+    if not may_fork():
+        return function()
+    reading, writing = os.pipe()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if not child:
+        os.close(reading)
+        _run_apart(function, writing, limits)
+    os.close(writing)
+    found = b""
+    over: ApartError | None = None
+    try:
+        with open(reading, "rb", buffering=0) as pipe:
+            found, over = _watched(child, pipe, limits)
+    except BaseException:
+        _end(child)
+        _status(child)
+        raise
+    status = _status(child)
+    if over is not None:
+        raise over
+    if status == 0:
+        result: R = pickle.loads(found)
+        return result
+    if status in (-signal.SIGKILL, -signal.SIGTERM, -signal.SIGINT):
+        raise ApartError("killed", f"the process was ended from outside ({signal.Signals(-status).name})")
+    how = signal.Signals(-status).name if status < 0 else f"exit status {status}"
+    raise ApartError("crashed", f"the process that worked on it crashed ({how})")
+
+
+def _status(child: int) -> int:
+    """Exit status of a child that has ended or will; that of a killed one where it was already waited for."""
+    try:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    except ChildProcessError:
+        return -signal.SIGKILL
+
+
+def _run_apart(function: Callable[[], Any], writing: int, limits: Limits) -> None:
+    """In the child: the function, its result into the pipe, and the end of the process."""
+    status = 70
+    try:
+        with suppress(ImportError, ValueError, OSError):
+            import resource
+
+            most = int((limits.gigabytes + ADDRESSES + 0.25 * (os.cpu_count() or 1)) * 1e9)
+            resource.setrlimit(resource.RLIMIT_AS, (most, most))
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        with suppress(AttributeError, OSError):  # Linux: asked to end when the process that watches is gone
+            import ctypes
+
+            ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+        result = pickle.dumps(function())
+        with open(writing, "wb") as pipe:
+            pipe.write(result)
+        status = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        os._exit(status)
+
+
+def _watched(child: int, pipe: Any, limits: Limits) -> tuple[bytes, ApartError | None]:
+    """What arrives in a pipe until it ends, and which limit ended the process, if one did."""
+    import psutil
+
+    until, around = time.monotonic() + 60.0 * limits.minutes, 0.0
+    family: list[psutil.Process] = []
+    found = bytearray()
+    with selectors.DefaultSelector() as selector:
+        selector.register(pipe, selectors.EVENT_READ)
+        while True:
+            if selector.select(LOOK_S):
+                part = pipe.read(1 << 16)
+                if not part:
+                    return bytes(found), None
+                found += part
+            now = time.monotonic()
+            with suppress(psutil.Error):
+                if now >= around:
+                    first = psutil.Process(child)
+                    family, around = [first, *first.children(recursive=True)], now + LOOK_AROUND_S
+            memory = [0.0]
+            for process in family:
+                with suppress(psutil.Error):
+                    memory.append(process.memory_info().rss / 1e9)
+            over = None
+            if max(memory) > limits.gigabytes:
+                over = ApartError("over_memory", f"it takes more memory than the {limits.gigabytes:g} GB that it may")
+            elif now > until:
+                over = ApartError("over_time", f"it takes longer than the {limits.minutes:g} minutes that it may")
+            if over is not None:
+                _end(child, at_once=over.kind == "over_memory")
+                return bytes(found), over
+
+
+def _end(child: int, *, at_once: bool = False) -> None:
+    """Ask a process and its children to end, and end what is left after a while."""
+    import psutil
+
+    with suppress(psutil.Error):
+        first = psutil.Process(child)
+        everyone = [*first.children(recursive=True), first]
+        for process in () if at_once else everyone:
+            with suppress(psutil.Error):
+                process.terminate()
+        left = everyone if at_once else psutil.wait_procs(everyone, timeout=END_S)[1]
+        for process in left:
+            with suppress(psutil.Error):
+                process.kill()
 
 
 def may_fork() -> bool:

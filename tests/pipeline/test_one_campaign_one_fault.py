@@ -7,6 +7,9 @@ import json
 import os
 import re
 import subprocess
+import sys
+import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +18,14 @@ from click.testing import CliRunner
 
 from tribo.campaign import table
 from tribo.cli import main
+from tribo.forked import ApartError, Limits
 from tribo.report.provenance import read_record
-from tribo.site import build, index_page
+from tribo.site import build, index_page, steps
 from tribo.site.build import BuildOptions, _configuration
 from tribo.site.history import CampaignRow, history
 from tribo.site.index_page import change_points, page, series, trend_csv, write_index
 from tribo.site.scan import scan
-from tribo.site.steps import Step, id_of, inputs_of, note
+from tribo.site.steps import Step, beyond_limits, forget_other_limits, id_of, inputs_of, note
 
 BAD_NAMES = (b"x" * 250, b"not-\xff-utf8", b"index.html", b"trend.csv", b"esc\x1b[31m", b"back\\slash")
 GOOD_NAMES = (
@@ -230,3 +234,89 @@ def test_a_sample_with_a_bar_in_its_name_has_its_trend() -> None:
     rows = [CampaignRow(f'no "{k}"', "", "done", measured=f"2026-01-{k + 1:02d}", laws=laws[k]) for k in range(12)]
     assert "Static μ of A|B rises" in page(rows, change_points(series(rows)))
     assert '"no ""3""",2026-01-04,A|B,static,mu,4,3.9,5.1' in trend_csv(rows).splitlines()
+
+
+HOSTILE = """
+import os, sys, time
+from tribo.cli import workflow_step
+
+def hostile(command):
+    if "aborts" in command: os.abort()
+    if "hangs" in command: time.sleep(60)
+    if "eats" in command: [bytearray(10_000_000) for _ in range(1000)]
+    if "asks" in command: return 1, {"problems": [{"kind": "out_of_memory", "what": "not enough memory"}]}
+    if "is-killed" in command: os.kill(os.getpid(), 9)
+    return 0, {}
+
+workflow_step._run = hostile
+sys.exit(workflow_step.main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked")
+@pytest.mark.parametrize(
+    ("campaign", "status", "kind"),
+    [("aborts", 0, "crashed"), ("hangs", 0, "over_time"), ("eats", 0, "over_memory"), ("asks", 0, "over_memory"),
+     ("is-killed", 137, ""), ("good", 0, "")],
+)  # fmt: skip
+def test_a_campaign_that_crashes_hangs_or_eats_memory_is_recorded_as_unusable_with_the_reason(
+    tmp_path: Path, campaign: str, status: int, kind: str
+) -> None:
+    folder = tmp_path / "steps" / "a"
+    folder.mkdir(parents=True)
+
+    def step(name: str) -> tuple[int, dict[str, Any]]:
+        record = folder / f"{name}.json"
+        given = [record, "--digest", "d", "--most-minutes", "0.02", "--most-gigabytes", "0.5"]
+        command = ["--", name, campaign, "-o", "../current/a"]
+        ended = subprocess.run([sys.executable, "-c", HOSTILE, *map(str, given), *command], check=False)
+        return ended.returncode, json.loads(record.read_text()) if record.is_file() else {}
+
+    ended, record = step("predict")
+    assert ended == status
+    assert bool(record) is (status == 0)
+    problems = record.get("problems", [])
+    assert [p["kind"] for p in problems] == [kind] * bool(kind)
+    assert not record or record["status"] == ("unusable" if kind else "done")
+    if kind in ("crashed", "over_time"):
+        assert problems[0]["file"] == campaign
+        assert "--most-minutes" in problems[0]["allowed"]
+        started = time.monotonic()
+        ended, report = step("report")  # is not run: it would take as long
+        assert (ended, report["problems"]) == (0, problems)
+        assert time.monotonic() - started < 30
+
+
+def test_other_limits_are_tried_and_the_same_ones_are_not(tmp_path: Path) -> None:
+    folder = tmp_path / "steps" / "a"
+    folder.mkdir(parents=True)
+    limits = Limits(1.0, 2.0)
+    ended = asdict(beyond_limits(ApartError("over_time", "too long"), limits, "/drop/a"))
+    for name, problems in {"predict": [ended], "report": [ended], "other": [{"kind": "no_load"}], "done": []}.items():
+        (folder / f"{name}.json").write_text(json.dumps({"problems": problems}))
+    forget_other_limits(tmp_path, limits)
+    assert len(list(folder.iterdir())) == 4
+    forget_other_limits(tmp_path, Limits(5.0, 2.0))
+    assert {path.stem for path in folder.iterdir()} == {"other", "done"}
+
+
+def test_a_campaign_that_cannot_be_listed_is_refused_with_the_reason_and_not_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drop = drop_of(tmp_path / "drop", "a", "b")
+    tried = []
+
+    def crashing(function: Any, limits: Limits) -> Any:
+        tried.append(limits)
+        if len(tried) == 1:
+            raise ApartError("crashed", "the process that worked on it crashed (SIGABRT)")
+        return [], [], []
+
+    monkeypatch.setattr(steps, "apart", crashing)
+    for rounds, made_with in ((2, "x"), (2, "x"), (3, "y")):
+        found, ready = inputs_of(scan(drop, settle_s=0.0), tmp_path / "inputs", made_with)
+        assert len(tried) == rounds
+        assert list(ready) == (["b"] if rounds == 2 else ["a", "b"])
+        if rounds == 2:
+            (refused,) = [campaign.refused for campaign in found if campaign.refused]
+            assert "SIGABRT" in refused[0]

@@ -70,7 +70,7 @@ def test_a_scheduler_that_goes_away_is_a_sentence(
 
     @contextmanager
     def workers(jobs: int, address: str) -> Iterator[Any]:
-        yield Pool()
+        yield Pool(), lambda: None
 
     monkeypatch.setattr(ensemble, "_executor", workers)
     with pytest.raises(SimulationError, match="the dask scheduler stopped answering"):

@@ -3,16 +3,20 @@
 A step asks for its result by name and gives everything the result is made from. If the file was made from exactly
 that, it is read; otherwise the result is computed and written. The hash covers the input values, the sources of the
 packages that compute and the versions of the libraries they use, so that no outdated result is returned after an edit
-or an upgrade. Each file bears a checksum; a damaged one is said and made again. The files are JSON: deleting one, or
-the folder, costs time and nothing else.
+or an upgrade. Each file bears a checksum, and a signature with a key of this user (HMAC, RFC 2104): one that is
+damaged, or that another user or machine has made, is said and made again. The files are JSON: deleting one, or the
+folder, costs time and nothing else.
 """
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import hmac
 import json
+import os
 import re
+import secrets
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
@@ -24,7 +28,9 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from tribo.cache.own_folder import only_writer
 from tribo.files import PATTERN_SHARES, bytes_of, data_dir, found_below, found_in, write_bytes
+from tribo.temporary import private_folder
 
 T = TypeVar("T")
 
@@ -33,6 +39,8 @@ class DamagedResultWarning(RuntimeWarning):
     """A kept result differs from its checksum, or cannot be read, and is made again."""
 
 
+FOREIGN = "was not made by this user on this machine"
+KEY, KEY_BYTES, KEY_WAIT_S = "kept-results.key", 32, 30.0
 LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -54,9 +62,14 @@ def kept_or_made(
         return make()
     key = fingerprint(made_from, sources(*code))
     path = folder / f"{name}.json"
-    kept = _read(path, key)
-    if kept is not None:
-        return cast(T, decoded(kept["result"]))
+    found, fault = _looked_at(path)
+    if found is not None and found[0] == key:
+        try:
+            return cast(T, decoded(json.loads(found[1])["result"]))
+        except (AttributeError, LookupError, TypeError, ValueError, ImportError, RecursionError) as why:
+            fault = f"cannot be read by this version ({type(why).__name__})"
+    if fault:
+        warnings.warn(f"{path}: this kept result {fault}; it is made again", DamagedResultWarning, stacklevel=2)
     result = make()
     try:
         text = json.dumps(encoded(result))
@@ -64,36 +77,69 @@ def kept_or_made(
         warnings.warn(f"{name} is not kept: {why}", RuntimeWarning, stacklevel=2)
         return result
     body = b'"result": ' + text.encode() + b"}\n"
-    write_bytes(path, _head(key, body) + body)
+    write_bytes(path, _head(name, key, body) + body)
     return result
 
 
-def _head(key: str, body: bytes) -> bytes:
-    """The first line of a kept file: what the result is made from, and the checksum of this and the result."""
-    checksum = hashlib.sha256(key.encode() + body).hexdigest()
-    return f'{{"made_from": "{key}", "sha256": "{checksum}",\n'.encode()
+def _head(name: str, key: str, body: bytes) -> bytes:
+    """The first line of a kept file: what the result is made from, checksum and signature of this and the result."""
+    content = key.encode() + body
+    checksum = hashlib.sha256(content).hexdigest()
+    signed = signature(name.encode() + b"\0" + content)
+    return f'{{"made_from": "{key}", "sha256": "{checksum}", "signed": "{signed}",\n'.encode()
 
 
-def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """The contents of a kept file made from ``key``; else None, and a warning where it is damaged or unreadable."""
+def _looked_at(path: Path) -> tuple[tuple[str, bytes] | None, str]:
+    """What an intact kept file of this user was made from, with its content, else None; and what is wrong with it."""
     try:
         content = bytes_of(path)
     except (FileNotFoundError, NotADirectoryError):
-        return None
+        return None, ""
     except OSError as why:
-        what = f"{path}: this kept result cannot be read ({why.strerror or why}); it is made again"
-        warnings.warn(what, DamagedResultWarning, stacklevel=3)
-        return None
+        return None, f"cannot be read ({why.strerror or why})"
     head, newline, body = content.partition(b"\n")
-    made_from = re.match(rb'\{"made_from": "([0-9a-f]{64})"', head)
-    if made_from is None or _head(made_from[1].decode(), body) != head + newline:
-        what = f"{path}: this kept result is damaged or of an older version; it is made again"
-        warnings.warn(what, DamagedResultWarning, stacklevel=3)
-        return None
-    if made_from[1].decode() != key:
-        return None
-    kept: dict[str, Any] = json.loads(content)
-    return kept
+    stated = re.match(rb'\{"made_from": "([0-9a-f]{64})", "sha256": "([0-9a-f]{64})"', head)
+    if stated is None or hashlib.sha256(stated[1] + body).hexdigest() != stated[2].decode():
+        return None, "is damaged or of an older version"
+    key = stated[1].decode()
+    if _head(path.stem, key, body) != head + newline:
+        return None, FOREIGN
+    return (key, content), ""
+
+
+def fault_of_kept(path: Path) -> str:
+    """Why a file of kept results is not believed, as the end of a sentence; empty where it is.
+
+    Raises
+    ------
+    OSError
+        The key of this user cannot be read.
+    """
+    return _looked_at(path)[1]
+
+
+def signature(content: bytes) -> str:
+    """HMAC-SHA-256 of a content with the key of this user, by which results are known as made here."""
+    return hmac.digest(_own_key(), content, "sha256").hex()
+
+
+@lru_cache(maxsize=1)
+def _own_key() -> bytes:
+    """The key in the private state folder of this user, made at its first use; else one for this process only.
+
+    Raises
+    ------
+    OSError
+        It is there and cannot be read, or cannot be written.
+    """
+    state = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
+    chosen = os.environ.get("TRIBO_STATE_DIR")
+    folder = private_folder([*([Path(chosen)] if chosen else []), Path(state) / "tribo"], "tribo-state-")
+    with only_writer(folder / f"{KEY}.lock", KEY_WAIT_S):
+        path = folder / KEY
+        if not path.is_file() or len(bytes_of(path)) != KEY_BYTES:
+            write_bytes(path, secrets.token_bytes(KEY_BYTES))
+        return bytes_of(path)
 
 
 @lru_cache(maxsize=32)

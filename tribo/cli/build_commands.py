@@ -85,11 +85,14 @@ def _moving_line() -> Iterator[Report]:
     from rich.console import Console as RichConsole
     from rich.progress import BarColumn, Progress as Bars, TextColumn
 
-    with Bars(TextColumn("{task.description}"), BarColumn(), console=RichConsole(stderr=True)) as bars:
+    # drawn by hand: a refreshing thread would forbid the build to read campaigns in processes of their own
+    columns = (TextColumn("{task.description}"), BarColumn())
+    with Bars(*columns, console=RichConsole(stderr=True), auto_refresh=False) as bars:
         task, started = bars.add_task("starting", total=1.0), time.monotonic()
 
         def report(progress: Progress) -> None:
             bars.update(task, completed=progress.share, description=in_words(progress, time.monotonic() - started))
+            bars.refresh()
 
         yield report
 
@@ -120,6 +123,20 @@ KEEP = click.option(
 )
 @click.option(
     "--wait", "wait_s", default=0.0, show_default=True, help="Seconds to wait if another build of the site is running."
+)
+@click.option(
+    "--most-minutes",
+    type=click.FloatRange(min=0, min_open=True),
+    default=240.0,
+    show_default=True,
+    help="Time that a step of one campaign may take; it is then ended, and the campaign counts as unusable.",
+)
+@click.option(
+    "--most-gigabytes",
+    type=click.FloatRange(min=0, min_open=True),
+    default=4.0,
+    show_default=True,
+    help="Memory that a process of one campaign may take.",
 )
 @FORCE
 @KEEP

@@ -18,7 +18,14 @@ from urllib.parse import quote
 
 import numpy as np
 
-from tribo.cache.kept_results import DamagedResultWarning, kept_or_made, sources
+from tribo.cache.kept_results import (
+    FOREIGN,
+    DamagedResultWarning,
+    fault_of_kept,
+    kept_or_made,
+    signature,
+    sources,
+)
 from tribo.errors import CampaignError, FitError, Problem, SimulationError, failed_by_system, naming
 from tribo.files import found_in
 from tribo.records import (
@@ -141,7 +148,7 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
     import pandas as pd
 
     from tribo.springblock import read_stored
-    from tribo.springblock.kept_runs import UNREADABLE
+    from tribo.springblock.kept_runs import UNREADABLE, fault_of
 
     found = []
     for path in found_in(kept, f"*@*{SUFFIX}"):
@@ -156,8 +163,41 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
             warnings.warn(f"{path}: these simulations are not used: {why}", DamagedResultWarning, stacklevel=2)
             continue
         if cell is not None and cell.path(kept) == path and table["done"].all():
+            if (fault := fault_of(cell.configs, path)) is not None:
+                said = f"{path}: these simulations are not used: {fault.what}"
+                warnings.warn(said, DamagedResultWarning, stacklevel=2)
+                continue
             found.append(table)
     return pd.concat(found, ignore_index=True) if found else None
+
+
+def kept_faults(kept: Path) -> dict[str, str]:
+    """Every file of a folder of kept results by its name, with why it is not believed, as the end of a sentence.
+
+    The reason is empty where this user has made the file on this machine and it is intact. Runs that this version
+    would not make count as believed here: they are left out where they would be used.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be listed.
+    """
+    import h5py
+
+    from tribo.springblock.kept_runs import UNREADABLE, checksum_of
+
+    found = {path.name: fault_of_kept(path) for path in found_in(kept, "*.json")}
+    for path in found_in(kept, f"*{SUFFIX}"):
+        try:
+            with h5py.File(path) as file:
+                checksum, signed = checksum_of(file), str(file.attrs.get("signed", ""))
+                damaged = checksum != str(file.attrs.get("checksum", ""))
+        except UNREADABLE as why:
+            found[path.name] = f"cannot be read as HDF5: {why}"
+            continue
+        foreign = "" if signed == signature(checksum.encode()) else FOREIGN
+        found[path.name] = "differs from its checksum" if damaged else foreign
+    return found
 
 
 def _cell_of(path: Path, table: pd.DataFrame, patterns: Mapping[str, Pattern]) -> Cell | None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from html import unescape
 from pathlib import Path
 from typing import Any, Literal
 
-from tribo.cache.own_folder import MARK
+from tribo.cache.own_folder import KEPT, MARK
+from tribo.comparison.prediction import kept_faults
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
 from tribo.files import bytes_of, found_below, leads_out
@@ -19,7 +20,6 @@ from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_na
 from tribo.user_text import well_formed
 
 ORIGIN = "inputs SHA-256 "  # begins what determines the numbers of a file, to the end of its origin
-KEPT = "kept"  # intermediate results, each checked against its own hash whenever it is used
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ class Verification:
     n_outputs: int
     differences: tuple[Difference, ...]
     unfinished: bool = False  # a run that was to write here was killed or failed
+    kept: Mapping[str, str] = field(default_factory=dict)  # kept results, with why each is not believed
 
     @property
     def unchanged(self) -> bool:
@@ -51,11 +52,16 @@ class Verification:
 
     def in_words(self) -> str:
         compared = f"{self.n_inputs} inputs and {self.n_outputs} outputs compared with {FILE}"
+        doubted = [f"kept result {KEPT}/{name} {why}; it is not used" for name, why in self.kept.items() if why]
+        believed = len(self.kept) - len(doubted)
+        made_here = f"{believed} of {len(self.kept)} kept results were made by this user on this machine"
+        kept = [*doubted, made_here] if self.kept else []
         if self.unchanged:
-            return f"{compared}: no changes"
+            return "\n".join([f"{compared}: no changes", *kept])
         lines = [f"{d.status} {d.kind}: {d.file}" for d in self.differences]
         ended = ["a run that was to write into this folder has not ended; start it again"] if self.unfinished else []
-        return "\n".join([f"{compared}: {len(lines)} difference{'' if len(lines) == 1 else 's'}", *lines, *ended])
+        differences = f"{len(lines)} difference{'' if len(lines) == 1 else 's'}"
+        return "\n".join([f"{compared}: {differences}", *lines, *ended, *kept])
 
 
 def verify(out: Path | str, campaign: Path | str | None = None) -> Verification:
@@ -72,7 +78,8 @@ def verify(out: Path | str, campaign: Path | str | None = None) -> Verification:
     -------
     Verification
         ``unchanged`` is true where every input and output is as recorded and the run has ended; ``differences`` name
-        each file that was changed, added or removed, or that another run made.
+        each file that was changed, added or removed, or that another run made. ``kept`` names every kept result, with
+        why the next start would not use it; empty where this user has made it on this machine.
 
     Raises
     ------
@@ -121,7 +128,8 @@ def verify(out: Path | str, campaign: Path | str | None = None) -> Verification:
         *_differences("output", record["outputs"], outputs),
         *(Difference("output", "another run's", name) for name in of_other_runs(out, record) if name in outputs),
     )
-    return Verification(str(place), len(recorded), len(record["outputs"]), differences, (out / MARK).exists())
+    unfinished, kept = (out / MARK).exists(), kept_faults(out / KEPT)
+    return Verification(str(place), len(recorded), len(record["outputs"]), differences, unfinished, kept)
 
 
 def of_other_runs(out: Path, record: Mapping[str, Any]) -> Iterator[str]:

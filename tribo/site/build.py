@@ -28,9 +28,21 @@ from tribo.cache.own_folder import STATE, WAIT, check_site, is_leftover, only_wr
 from tribo.dry_run import Checked, check
 from tribo.errors import Problem, TriboError
 from tribo.files import found_below, found_in, text_of, write_text
+from tribo.forked import Limits
 from tribo.site.history import collect_laws
 from tribo.site.scan import CURRENT, Dropped, clear_unfinished, date_build, difference, scan
-from tribo.site.steps import INDEX, JOURNAL, OF_A_REPORT, Step, due_steps, id_of, inputs_of, journal, read_record
+from tribo.site.steps import (
+    INDEX,
+    JOURNAL,
+    OF_A_REPORT,
+    Step,
+    due_steps,
+    forget_other_limits,
+    id_of,
+    inputs_of,
+    journal,
+    read_record,
+)
 from tribo.stages import StudyOptions
 from tribo.temporary import PREFIX, clear_abandoned, place_of_temporary_files, temporary_folder_of_child
 from tribo.traces.rules import named_rule
@@ -180,7 +192,8 @@ class BuildOptions(StudyOptions):
     """What a build may choose besides the options of a study.
 
     ``settle_s`` is how long a file must rest, ``keep`` how many dated copies stay, ``wait_s`` how long to wait for
-    another build, ``force`` whether to write into a folder that holds files of others.
+    another build, ``force`` whether to write into a folder that holds files of others. A step of a campaign may take
+    ``most_minutes``, and each of its processes ``most_gigabytes`` of memory.
     """
 
     profile: str = "local"
@@ -188,6 +201,8 @@ class BuildOptions(StudyOptions):
     keep: int = 10
     wait_s: float = 0.0
     force: bool = False
+    most_minutes: float = 240.0
+    most_gigabytes: float = 4.0
 
     def of_commands(self) -> dict[str, str]:
         """Options of the commands of the workflow, and all of them in words for what a step is made from."""
@@ -335,6 +350,7 @@ def _refused(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
 def _built(
     drop: Path, state: Path, options: BuildOptions, tell: Callable[[Progress], None], descriptor: int | None
 ) -> Built:
+    forget_other_limits(state, Limits(options.most_minutes, options.most_gigabytes))
     found, ready, due = _due(drop, state / "inputs", options)
     config = _configuration(found, ready, state / "build.json", options)
     steps = _steps(state, ready, due, config, options)
@@ -422,6 +438,7 @@ def _configuration(found: Sequence[Dropped], ready: Mapping[str, Any], file: Pat
         "options": options.of_commands(),
         "python": sys.executable,
         "threads": options.jobs,
+        "limits": f"--most-minutes {options.most_minutes:g} --most-gigabytes {options.most_gigabytes:g}",
     }
     return write_text(file, json.dumps(config, indent=1) + "\n")
 

@@ -16,13 +16,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tribo.errors import CampaignError, is_of_the_system, unexpected
-from tribo.files import text_of, write_text
+from tribo.errors import CampaignError, Problem, is_of_the_system, unexpected
+from tribo.files import found_below, text_of, write_text
+from tribo.forked import ApartError, Limits, apart
 from tribo.site.scan import Dropped
 
 JOURNAL = Path("log") / "steps.jsonl"  # in the state of a site
 INDEX = "index"
 OF_A_REPORT = ("status", "digest", "problems", "finished")
+OF_LIMITS = ("over_time", "over_memory", "crashed")  # kinds of problems of a campaign that ends its process
+LISTING = Limits(5.0, 2.0)  # to read the table of a campaign, which is of limited size
 _TYPES: dict[str, type | tuple[type, ...]] = {
     "status": str, "digest": str, "finished": str, "files": dict, "problems": list, "samples": list, "cells": list,
 }  # fmt: skip
@@ -143,6 +146,22 @@ def due_steps(state: Path, ready: Mapping[str, Any], by_cell: bool) -> list[Step
     return due
 
 
+def beyond_limits(why: ApartError, limits: Limits, campaign: str) -> Problem:
+    """The problem of a campaign that took more than it may, or ended its process."""
+    most = f"{limits.minutes:g} minutes and {limits.gigabytes:g} GB for a step (--most-minutes, --most-gigabytes)"
+    return Problem(why.kind, why.what, file=campaign or None, allowed=most)
+
+
+def forget_other_limits(state: Path, limits: Limits) -> None:
+    """Remove the records of steps that other limits than these have ended, so that they run again."""
+    now = beyond_limits(ApartError("", ""), limits, "").allowed
+    for path in found_below(state / "steps", "*.json"):
+        record = read_record(path, "problems")
+        for problem in record["problems"] if record else ():
+            if isinstance(problem, dict) and problem.get("kind") in OF_LIMITS and problem.get("allowed") != now:
+                path.unlink(missing_ok=True)
+
+
 def inputs_of(
     found: Iterable[Dropped], folder: Path, made_with: str = ""
 ) -> tuple[tuple[Dropped, ...], dict[str, dict[str, Any]]]:
@@ -157,10 +176,9 @@ def inputs_of(
     campaigns, inputs = [], {}
     for campaign in found:
         if campaign.is_ready:
-            try:
-                samples, cells = _listed(campaign, folder)
-            except CampaignError as why:
-                campaigns.append(replace(campaign, refused=tuple(map(str, why.problems))))
+            samples, cells, refused = _listed(campaign, folder, made_with)
+            if refused:
+                campaigns.append(replace(campaign, refused=tuple(refused)))
                 continue
             overrides = ["--overrides", str(campaign.overrides)] if campaign.overrides else []
             inputs[campaign.name] = {
@@ -171,24 +189,32 @@ def inputs_of(
     return tuple(campaigns), inputs
 
 
-def _listed(campaign: Dropped, folder: Path) -> tuple[list[str], list[str]]:
-    """Samples and cells of a campaign, those that are kept where it has not changed."""
+def _listed(campaign: Dropped, folder: Path, made_with: str) -> tuple[list[str], list[str], list[str]]:
+    """Samples and cells of a campaign, or why it is refused; those that are kept where it has not changed."""
     file = folder / f"{campaign.name}.json"
     known = read_record(file, "digest", "samples", "cells")
-    if known is None or known["digest"] != campaign.digest:
-        samples, cells = _to_simulate(campaign)
+    tried_with = known.get("refused_with") if known else None
+    if known is None or known["digest"] != campaign.digest or tried_with not in (None, made_with):
+        try:
+            samples, cells, refused = apart(lambda: _to_simulate(campaign), LISTING)
+        except ApartError as why:
+            samples, cells, refused = [], [], [str(beyond_limits(why, LISTING, str(campaign.path)))]
+            if why.kind in OF_LIMITS:
+                tried_with = made_with
+        else:
+            tried_with = None
         known = {"digest": campaign.digest, "samples": samples, "cells": cells, "files": dict(campaign.files)}
+        if refused and tried_with is None:
+            return samples, cells, refused  # by the system: the next build tries again
+        known |= {"refused": refused, "refused_with": tried_with} if refused else {}
         write_text(file, json.dumps(known, indent=1) + "\n")
-    return known["samples"], known["cells"]
+    return known["samples"], known["cells"], known.get("refused") or []
 
 
-def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
+def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str], list[str]]:
     """Samples and cells as a campaign describes them; none where it cannot be used (its first step says why).
 
-    Raises
-    ------
-    CampaignError
-        The system cannot read it.
+    The third list says why the system cannot read it now.
     """
     from tribo.campaign import open_campaign
     from tribo.comparison.prediction import cell_name, loads_to_simulate, sample_as_word
@@ -199,12 +225,9 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
             samples = [s for s in opened.samples if s in measured]
             words = [sample_as_word(s) for s in samples]
             pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
-            return words, [cell_name(s, p) for s in samples for p in pressures]
+            return words, [cell_name(s, p) for s in samples for p in pressures], []
     except CampaignError as why:
         problems = why.problems
     except Exception as why:  # of an error in tribo, its first step will say it again, as the fault of this campaign
         problems = (unexpected(why, "the samples of this campaign cannot be listed", str(campaign.path)),)
-    of_system = [problem for problem in problems if is_of_the_system(problem.kind)]
-    if of_system:
-        raise CampaignError(of_system)
-    return [], []
+    return [], [], [str(problem) for problem in problems if is_of_the_system(problem.kind)]

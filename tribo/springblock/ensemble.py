@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import platform
 import re
+import time
+import warnings
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Executor, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib import import_module
+from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from tribo.cache.kept_results import LIBRARIES, DamagedResultWarning, sources
 from tribo.errors import Problem, SimulationError
 from tribo.records import Pattern, Run
 from tribo.springblock.config import SimConfig
@@ -28,6 +32,8 @@ AngleRule = Literal["midpoints", "random", "nominal"]
 Angles = AngleRule | Sequence[float]
 Progress = Callable[[int, int], None]
 SCHEDULER_TIMEOUT_S = 10.0
+WORKERS_TIMEOUT_S = 120.0  # for the first worker of a scheduler, or the next one where all have left
+LOOK_S = 5.0  # how often the scheduler is asked for its workers while no run ends
 ANGLE_SPREAD_DEG = 10.0  # around the nominal direction of an anisotropic sample (Berardo 2019)
 
 
@@ -244,20 +250,34 @@ def finished_runs(
     Raises
     ------
     SimulationError
-        A run failed; no dask, or no scheduler at the address; or the scheduler went away.
+        A run failed; no dask, or no scheduler at the address; it has no workers, or none with the sources and versions
+        of this process; the scheduler went away, or a run ended its workers.
     """
     threads = max(1, jobs // max(1, len(configs))) if scheduler is None else 1
-    with _executor(jobs, scheduler) as pool:
+    with _executor(jobs, scheduler) as (pool, check_workers):
         pending = {pool.submit(made, config, work, threads): k for k, config in enumerate(configs)}
+        left = set(pending)
         try:
-            for future in as_completed(pending):
-                yield pending[future], future.result()
+            while left:
+                done, left = wait(left, LOOK_S, FIRST_COMPLETED)
+                for future in done:
+                    yield pending[future], future.result()
+                if not done:
+                    check_workers()
         except (OSError, asyncio.CancelledError, concurrent.futures.CancelledError) as why:
             if scheduler is None:
                 raise
             what = "the dask scheduler stopped answering; finished runs are kept and the next start continues"
             reason = str(why) or type(why).__name__
             raise SimulationError(Problem("scheduler_gone", what, column="scheduler", found=reason[:200])) from why
+        except Exception as why:
+            if scheduler is None or not isinstance(why, import_module("distributed").KilledWorker):
+                raise
+            what = "a run ended every worker that tried it, for want of memory perhaps; finished runs are kept"
+            reason = " ".join(str(why).split())[:200]
+            raise SimulationError(
+                Problem("workers_killed", what, column="scheduler", found=reason, allowed="workers with more memory")
+            ) from why
         finally:
             for future in pending:
                 future.cancel()
@@ -268,12 +288,61 @@ def made(config: SimConfig, work: Work, threads: int) -> Mapping[str, Any]:
     return work.read(simulate(config, threads) if work.run is None else work.run(config))
 
 
+class RefusedWorkerWarning(DamagedResultWarning):
+    """A worker of a scheduler runs other code or versions, and gets no work."""
+
+
+def identity() -> dict[str, str]:
+    """What decides the bits of a run in this process: Python, the libraries, and a hash of the sources of tribo."""
+    versions = {library: metadata.version(library) for library in (*LIBRARIES, "llvmlite")}
+    return {"Python": platform.python_version(), **versions, "tribo": sources("")}
+
+
+def checked_workers(client: Any, scheduler: str) -> list[str]:
+    """Addresses of the workers that would make the same runs as this process; a warning names each other one.
+
+    Raises
+    ------
+    SimulationError
+        There are no workers, after :data:`WORKERS_TIMEOUT_S`, or all of them run other code.
+    """
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_TIMEOUT_S)
+    except TimeoutError as why:
+        raise SimulationError(_no_workers(scheduler)) from why
+    own, good, refused = identity(), [], []
+    for address, found in client.run(identity, on_error="return").items():
+        if found == own:
+            good.append(str(address))
+            continue
+        if isinstance(found, dict):
+            other = [f"{name} {found.get(name)} (here {mine})" for name, mine in own.items() if found.get(name) != mine]
+            named = [text if not text.startswith("tribo ") else "other sources of tribo" for text in other]
+        else:
+            named = [f"no answer: {type(found).__name__}: {' '.join(str(found).split())[:200]}"]
+        refused.append(f"worker {address}: {', '.join(named)}")
+    if not good:
+        what = "no worker of this scheduler runs the code of this process"
+        allowed = "workers with the same Python, libraries and sources of tribo"
+        raise SimulationError(
+            Problem("other_workers", what, column="scheduler", found="; ".join(refused), allowed=allowed)
+        )
+    for said in refused:
+        warnings.warn(f"{said}; it gets no work", RefusedWorkerWarning, stacklevel=2)
+    return good
+
+
+def _no_workers(scheduler: str) -> Problem:
+    what = f"the dask scheduler has no workers; {WORKERS_TIMEOUT_S:g} s were waited for one, and finished runs are kept"
+    return Problem("no_workers", what, column="scheduler", found=scheduler, allowed=f"dask worker {scheduler}")
+
+
 @contextmanager
-def _executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
-    """Threads of this process, or the workers of a dask scheduler."""
+def _executor(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, Callable[[], None]]]:
+    """Threads of this process, or the workers of a dask scheduler; and a check that there still are workers."""
     if scheduler is None:
         with ThreadPoolExecutor(max(1, jobs)) as pool:
-            yield pool
+            yield pool, lambda: None
         return
     try:
         distributed = import_module("distributed")
@@ -295,6 +364,17 @@ def _executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
         ) from why
     try:
         with client, client.as_current():
-            yield client.get_executor(pure=False)
+            chosen = checked_workers(client, scheduler)
+            seen = time.monotonic()
+
+            def check() -> None:
+                nonlocal seen
+                now = time.monotonic()
+                if set(client.scheduler_info()["workers"]) & set(chosen):
+                    seen = now
+                elif now - seen > WORKERS_TIMEOUT_S:
+                    raise SimulationError(_no_workers(scheduler))
+
+            yield client.get_executor(pure=False, workers=chosen), check
     finally:  # a client that ends leaves itself behind as the scheduler of whatever else uses dask in this process
         import_module("dask").config.set(scheduler=None)

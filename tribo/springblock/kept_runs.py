@@ -1,7 +1,8 @@
 """Runs and ensembles as HDF5 files that xarray and plain h5py read, and the files of an ensemble that goes on.
 
 A file is always written whole: every :data:`WRITE_EVERY_S` while its runs are made, and once more when they end or are
-interrupted. It bears a checksum of all it holds, and the hashes of its design and of the sources that made it.
+interrupted. It bears a checksum of all it holds, the signature of the user who made it, and the hashes of its design
+and of the sources that made it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tribo.cache.kept_results import DamagedResultWarning, sources
+from tribo.cache.kept_results import FOREIGN, DamagedResultWarning, signature, sources
 from tribo.cache.own_folder import only_writer_of
 from tribo.display import exact_text
 from tribo.errors import Problem, SimulationError, failed_by_system
@@ -111,8 +112,13 @@ def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[st
     return write_columns(Path(path), "run", columns, {"title": ENSEMBLE, **attributes(parameters or {})})
 
 
-def write_columns(path: Path, dimension: str, columns: Mapping[str, Column], about: Mapping[str, Any]) -> Path:
-    """Columns of equal length along one of them, with a checksum of all. xarray would take a second to import."""
+def write_columns(
+    path: Path, dimension: str, columns: Mapping[str, Column], about: Mapping[str, Any], *, signed: bool = False
+) -> Path:
+    """Columns of equal length along one of them, with a checksum of all. xarray would take a second to import.
+
+    Where it is ``signed``, the checksum has the signature of this user as well.
+    """
     import h5py
 
     with whole_hdf5(path) as held, h5py.File(held, "w") as file:
@@ -127,13 +133,15 @@ def write_columns(path: Path, dimension: str, columns: Mapping[str, Column], abo
             else:
                 column.dims[0].attach_scale(file[dimension])
         file.attrs["checksum"] = checksum_of(file)
+        if signed:
+            file.attrs["signed"] = signature(str(file.attrs["checksum"]).encode())
     return path
 
 
 def checksum_of(file: Any) -> str:
-    """SHA-256 of every attribute and column of an open file, the checksum itself left out."""
+    """SHA-256 of every attribute and column of an open file, the checksum itself and its signature left out."""
     digest = hashlib.sha256()
-    for name in sorted(set(file.attrs) - {"checksum"}):
+    for name in sorted(set(file.attrs) - {"checksum", "signed"}):
         digest.update(f"{name} {np.asarray(file.attrs[name]).tolist()!r}\n".encode())
     for name in sorted(file):
         values = file[name][:]
@@ -303,7 +311,8 @@ def fault_of(design: Sequence[SimConfig], path: Path, work: Work = FRICTION) -> 
     try:
         with h5py.File(path) as file:
             made_from = file.attrs["design"], file.attrs["sources"]
-            intact = file.attrs.get("checksum") == checksum_of(file)
+            checksum, signed = (str(file.attrs.get(name, "")) for name in ("checksum", "signed"))
+            intact = checksum == checksum_of(file)
     except UNREADABLE as why:
         return _no_store(path, why)
     if made_from[0] != fingerprint(design, work):
@@ -311,7 +320,11 @@ def fault_of(design: Sequence[SimConfig], path: Path, work: Work = FRICTION) -> 
     if made_from[1] != sources(*work.rooms):
         what = "it holds runs of another version of tribo or of its libraries, and is not continued"
         return Problem("other_version", what, file=place, allowed=allowed)
-    return None if intact else Problem("damaged_store", "it differs from its checksum", file=place)
+    if not intact:
+        return Problem("damaged_store", "it differs from its checksum", file=place)
+    if signature(checksum.encode()) != signed:
+        return Problem("foreign_store", f"it {FOREIGN}", place, allowed=allowed)
+    return None
 
 
 def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
@@ -339,7 +352,8 @@ def _write(design: Sequence[SimConfig], path: Path, work: Work, rows: Mapping[in
         "sources": sources(*work.rooms),
         **attributes(_shared_parameters(design)),
     }
-    write_columns(path, "run", {n: (v, {"units": units.get(n) or unit_of(n)}) for n, v in columns.items()}, about)
+    typed = {n: (v, {"units": units.get(n) or unit_of(n)}) for n, v in columns.items()}
+    write_columns(path, "run", typed, about, signed=True)
 
 
 def varied_columns(table: pd.DataFrame) -> list[str]:
