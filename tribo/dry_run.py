@@ -84,7 +84,6 @@ def _with_known_rule(options: StudyOptions, faults: list[Problem]) -> StudyOptio
 def _checked(
     campaign: Campaign, options: StudyOptions, until: Until, faults: list[Problem], progress: Progress
 ) -> Checked:
-    from tribo.fitting.siblings import sibling_doubts
     from tribo.plausibility import doubts_of
 
     campaign = with_zeros(campaign, options.zero, options.load_zero)
@@ -104,7 +103,7 @@ def _checked(
         tuple(dict.fromkeys(faults)),
         ingested.set_aside,
         ingested.doubts(),
-        (*sibling_doubts(ingested), *doubts_of(campaign, ingested, fits)),
+        stages.all_doubts(ingested, fits),
         _notes(campaign),
         len(ingested.pulls),
     )

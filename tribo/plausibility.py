@@ -253,6 +253,10 @@ _MM2, _MM, _UM = 1e6, 1e3, 1e6
 _TABLE, _TOML = "tests.csv", "campaign.toml"
 _COVERAGE = 2.0  # standard uncertainties by which a fitted number must lie outside
 _MOST_SHOWN = 3
+_SLIDING_ABOVE = 0.5  # of the static force, by which sliding is rarely above it
+_CERTAIN = 4.0  # standard uncertainties of an intercept
+_LEAST_OFFSET = 0.5  # of the weight of the slider
+_ROOM_C = (10.0, 35.0)  # of laboratories
 
 
 def doubts_of(campaign: Campaign, ingested: Ingested | None = None, fits: Sequence[LawFit] = ()) -> tuple[Doubt, ...]:
@@ -264,8 +268,11 @@ def doubts_of(campaign: Campaign, ingested: Ingested | None = None, fits: Sequen
     found = [doubt for q, by in numbers.items() if (doubt := _outside(campaign, q, by, _PLACES[q], slip)) is not None]
     if not slip:  # one that explains the loads or the area explains these as well
         found += [*_wide_pitches(campaign), *_load_span(campaign)]
-    found += [*_stated(campaign), *_geometry(campaign), *_names(campaign), *_sled(campaign), *_order(campaign)]
-    return (*found, *_rests(campaign), *(_exports(ingested) if ingested is not None else ()))
+    measured = () if ingested is None else (*_signals(ingested), *_slid_above_static(ingested))
+    offset = () if slip else _load_offset(campaign, fits)
+    stated = (*_stated(campaign), *mixed_units(campaign), *_geometry(campaign), *_names(campaign))
+    written = (*_sled(campaign), *_order(campaign), *_rests(campaign))
+    return (*measured, *found, *offset, *stated, *written, *(_exports(ingested) if ingested is not None else ()))
 
 
 def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawFit]) -> Numbers:
@@ -354,6 +361,115 @@ def _stated(campaign: Campaign) -> Iterator[Doubt]:
         found = f"at most {max(fractions):g}{of}"
         fraction = "humidity_pct looks like a fraction: multiply by 100?"
         yield Doubt("humidity_pct", _NAMES["humidity_pct"], found, "1 to 100", _PLACES["humidity_pct"], fraction)
+
+
+SIGNALS = {
+    "clipped": ("the peak", "noise up to the largest value"), "toggles": ("the force", "noise throughout"),
+    "coarse": ("the resolution of the force", "steps below its noise"),
+    "repeated_samples": ("the record", "every data point once"),
+}  # fmt: skip
+
+
+def _signals(ingested: Ingested) -> Iterator[Doubt]:
+    """Records whose samples look like no measurement: one doubt for each kind, with its size in newtons."""
+    files = {test.test_id: test.file for test in ingested.campaign.tests}
+    for kind, (name, plausible) in SIGNALS.items():
+        seen = {i: p for i, pull in ingested.pulls.items() for p in pull.problems if p.kind == kind}
+        if not seen:
+            continue
+        test_id, problem = next(iter(seen.items()))
+        of = f"test {test_id}" if len(seen) == 1 else f"{len(seen)} of {len(ingested.pulls)} tests"
+        row = f", row {problem.row}" if problem.row is not None else ""
+        place = f"{files.get(test_id) or problem.file}{row}" + ("" if len(seen) == 1 else ", and the others")
+        found = f"odd: {problem.what}" + (f" ({problem.found})" if problem.found else "")
+        yield Doubt("signal", f"{name} of {of}", found, plausible, place, tests=tuple(seen))
+
+
+def _slid_above_static(ingested: Ingested) -> Iterator[Doubt]:
+    """Tests that slid at a force far above their static peak."""
+    beyond = {}
+    for test_id, pull in ingested.pulls.items():
+        more_N = pull.sliding_N - pull.static_N
+        u_N = math.hypot(*(u for u in (pull.static_u_N, pull.sliding_u_N) if math.isfinite(u)), 0.0)
+        if pull.static_N > 0 and more_N > max(_SLIDING_ABOVE * pull.static_N, 4.0 * u_N):
+            beyond[test_id] = f"{pull.sliding_N:.3g} N, {more_N:.3g} N above the static force ({test_id})"
+    if beyond:
+        most = 2 * len(beyond) > len(ingested.pulls)
+        slip = "static_N and sliding_N interchanged?" if most else "another load while sliding, or another peak?"
+        name = f"sliding friction of {len(beyond)} of {len(ingested.pulls)} tests"
+        place = f"{_TABLE} and the records"
+        plausible = "below or near the static force"
+        yield Doubt("signal", name, _listed(list(beyond.values())), plausible, place, slip, tests=tuple(beyond))
+
+
+def _load_offset(campaign: Campaign, fits: Sequence[LawFit]) -> Iterator[Doubt]:
+    """Laws of most samples that give no friction at one and the same load: so much of the load did not press."""
+    if campaign.slider_mass_kg <= 0 or not any(t.load_from == "mass_g" for t in campaign.tests):
+        return
+    slider_N = campaign.slider_mass_kg * STANDARD_GRAVITY
+    missing = []
+    for fit in fits:
+        if not (fit.has_area and "tau0_Pa" in fit.parameters and fit.value("mu") > 0 and campaign.has_area):
+            continue
+        offset_N = -fit.value("tau0_Pa") * campaign.area_m2 / fit.value("mu")
+        u_N = fit.by_itself.standard_uncertainty("tau0_Pa") * campaign.area_m2 / fit.value("mu")
+        missing.append(offset_N if math.isfinite(u_N) and offset_N > _CERTAIN * u_N else math.nan)
+    sure = [n for n in missing if math.isfinite(n)]
+    if len(sure) >= 2 and len(sure) >= 2 / 3 * len(missing):
+        offset_N = float(np.median(sure))
+        if offset_N > _LEAST_OFFSET * slider_N and np.ptp(sure) < offset_N:
+            mass_g = max(campaign.slider_mass_kg - offset_N / STANDARD_GRAVITY, 0.0) * 1e3
+            found = f"such that friction vanishes at a load of {offset_N:.3g} N in {len(sure)} of {len(missing)} laws"
+            slip = f"slider_mass_g is {campaign.slider_mass_kg * 1e3:g}; about {mass_g:.2g} would explain it"
+            plausible = "no load without friction"
+            yield Doubt("slider_mass_g", "the load", found, plausible, f"{_TOML}, slider_mass_g", f"{slip}?")
+
+
+def mixed_units(campaign: Campaign) -> Iterator[Doubt]:
+    """Columns in two units: masses or loads some of which are a thousandth of others, holds a sixtieth, Fahrenheit.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Its tests are looked at; no export is read.
+    """
+    masses = {t.test_id: t.mass_kg * 1e3 for t in campaign.tests if t.mass_kg and t.load_from == "mass_g"}
+    loads = {t.test_id: t.normal_load_N for t in campaign.tests if t.load_from == "normal_load_N"}
+    held = {t.test_id: t.hold_s for t in campaign.tests if t.hold_s}
+    for column, by, factor, unit, share in (
+        ("mass_g", masses, 1000.0, "kilograms", 0.0), ("normal_load_N", loads, 1000.0, "kilonewtons", 0.0),
+        ("hold_s", held, 60.0, "minutes", 1.0),
+    ):  # fmt: skip
+        small = _a_part_of_others(by, factor, share)
+        if small:
+            found = f"{by[small[0]]:g} in {len(small)} of {len(by)} tests ({_listed(small)}), and {factor:g} times that"
+            name, slip = f"column {column}", f"it looks like {unit} there: multiply by {factor:g}?"
+            place, allowed = f"{_TABLE}, column {column}", "one unit for all tests"
+            yield Doubt(column, name, f"{found} in others", allowed, place, slip, tests=tuple(small))
+    warmth = {t.test_id: t.temperature_C for t in campaign.tests if t.temperature_C is not None}
+    low, high = _ROOM_C
+    room = [name for name, celsius in warmth.items() if low <= celsius <= high]
+    warm = [name for name, celsius in warmth.items() if low <= (celsius - 32.0) / 1.8 <= high]
+    drifts = len({warmth[name] for name in warm}) > len(warm) / 4  # a heated stage holds a value
+    if warm and drifts and len(room) + len(warm) == len(warmth):
+        span = f"{min(warmth[n] for n in warm):g} to {max(warmth[n] for n in warm):g}"
+        found = f"{span} in {len(warm)} of {len(warmth)} tests ({_listed(warm)})"
+        slip = "it looks like Fahrenheit: subtract 32 and divide by 1.8?"
+        plausible, name = f"{low:g} to {high:g} where nothing is heated", _NAMES["temperature_C"]
+        yield Doubt("temperature_C", name, found, plausible, _PLACES["temperature_C"], slip, tests=tuple(warm))
+
+
+def _a_part_of_others(by: Mapping[str, float], factor: float, share: float) -> list[str]:
+    """Tests with a value of which ``factor`` times is that of others, where a share of all values come in such pairs.
+
+    Hold times of 1 s and 60 s may be meant; loads over three decades, of exactly a thousand times others, hardly.
+    """
+    values = sorted(set(by.values()))
+    small = {v for v in values for other in values if v > 0 and abs(factor * v / other - 1.0) < 1e-6}
+    large = {v for v in values for other in small if abs(v / (factor * other) - 1.0) < 1e-6}
+    if not small or small & large or len(small) + len(large) < share * len(values):
+        return []
+    return [name for name, value in by.items() if value in small]
 
 
 def _names(campaign: Campaign) -> Iterator[Doubt]:

@@ -572,8 +572,8 @@ class Doubt:
     number it is for.
 
     ``quantity`` is its name for programs, ``name`` that for people; ``found`` and ``plausible`` are texts with units,
-    ``place`` is where to look, ``slip`` the question that may explain it, ``source`` where the bounds are from, and
-    ``material_class`` the class they hold for.
+    ``place`` is where to look, ``slip`` the question that may explain it, ``source`` where the bounds are from,
+    ``material_class`` the class they hold for, and ``tests`` the tests in doubt where it is not about all of them.
     """
 
     quantity: str
@@ -584,6 +584,7 @@ class Doubt:
     slip: str = ""
     source: str = ""
     material_class: str = ""
+    tests: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.without_slip()}. Likely slip: {self.slip}" if self.slip else self.without_slip()

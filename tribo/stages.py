@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +17,7 @@ from tribo.display import displayed
 from tribo.errors import FitError, SimulationError
 from tribo.records import (
     Campaign,
+    Doubt,
     Feature,
     Fits,
     Ingested,
@@ -418,14 +419,22 @@ def naming_set_aside(ingested: Ingested) -> Iterator[None]:
 
 def with_doubts(study: Study) -> Study:
     """The study with the numbers that lie outside their broad physical bounds, or far from those of their siblings."""
-    from tribo.fitting.siblings import sibling_doubts
-    from tribo.plausibility import doubts_of
-
     fits = study.fits
     with suppress(FitError):
         fits = fits or fit(study.ingested)
-    bounds = doubts_of(study.ingested.campaign, study.ingested, _alone(fits))
-    return replace(study, doubts=(*sibling_doubts(study.ingested), *bounds))
+    return replace(study, doubts=all_doubts(study.ingested, _alone(fits)))
+
+
+def all_doubts(ingested: Ingested, fits: Sequence[LawFit]) -> tuple[Doubt, ...]:
+    """Doubts of stated columns that explain others, of pulls by their siblings, of signals, and of what is fitted."""
+    from tribo.fitting.siblings import sibling_doubts
+    from tribo.plausibility import bound_of, doubts_of, mixed_units
+
+    ratio = bound_of("friction_ratio", ingested.campaign)
+    causes = tuple(mixed_units(ingested.campaign))
+    siblings = sibling_doubts(ingested, plausible=(ratio.low, ratio.high))
+    others = (d for d in doubts_of(ingested.campaign, ingested, fits) if d not in causes)
+    return (*causes, *siblings, *others)
 
 
 def without_model(campaign: Campaign, options: StudyOptions) -> str:

@@ -92,3 +92,16 @@ def test_loads_that_scatter_about_one_do_not_lead_to_another(ingested: Ingested)
         traces={i: ingested.traces[i] for i in ids},
     )  # fmt: skip
     assert sibling_doubts(alike) == ()
+
+
+def test_forces_of_one_sample_copied_from_another_are_named(ingested: Ingested) -> None:
+    at = {(t.sample, t.normal_load_N, t.specimen[-1]): t.test_id for t in ingested.campaign.tests}
+    pulls = dict(ingested.pulls)
+    for (sample, load, body), test_id in at.items():
+        if sample == "B":
+            theirs = ingested.pulls[at["A", load, body]]
+            pulls[test_id] = replace(pulls[test_id], static_N=theirs.static_N, sliding_N=theirs.sliding_N)
+    doubts = sibling_doubts(replace(ingested, pulls=pulls))
+    (copied,) = [d for d in doubts if "digit by digit" in d.found]
+    assert copied.name == "friction of sample A"
+    assert "12 of 12 pairs of forces are those of sample B" in copied.found

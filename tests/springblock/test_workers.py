@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -131,7 +132,7 @@ def test_workers_that_leave_while_runs_wait_are_told(monkeypatch: pytest.MonkeyP
 
 
 def test_a_run_that_ends_every_worker_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    killed = distributed.KilledWorker("made-1", None, 3)
+    killed = distributed.KilledWorker("made-1", SimpleNamespace(address="tcp://w:1"), 3)
 
     class Killing:
         def submit(self, *_: object) -> Future[Any]:

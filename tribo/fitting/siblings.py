@@ -27,6 +27,7 @@ MAD_TO_SD = 1.4826
 LOAD_TOLERANCE = 0.02
 LOADS_APART = 0.1  # by which two loads differ, as ln, at the least: the line of loads that are alike leads anywhere
 MOST_NAMED = 3
+FEWEST_COPIED, COPIED_SHARE, COPIED_DIGITS = 3, 0.25, 3  # pairs of forces with so many digits, equal by chance hardly
 FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
 NEAR = 0.25  # by which a factor may differ from that of a slip, as ln
 
@@ -54,13 +55,18 @@ class _Pulls:
         return np.asarray(pd.factorize(pd.MultiIndex.from_arrays([self.sample, self.specimen]))[0])
 
 
-def sibling_doubts(ingested: Ingested, *, seed: int = 0) -> tuple[Doubt, ...]:
+def sibling_doubts(
+    ingested: Ingested, *, plausible: tuple[float, float] = (0.0, math.inf), seed: int = 0
+) -> tuple[Doubt, ...]:
     """A doubt for every pull, and for every group of pulls, whose forces are far from those of its siblings.
 
     Parameters
     ----------
     ingested : Ingested
         Pulls with their tests.
+    plausible : tuple of float
+        The least and the largest T/N: where half of the pulls differ from the others by a factor, those are wrong
+        without which the samples are within them.
     seed : int
         Draws the campaigns of the same design from which it is known how far chance goes.
     """
@@ -72,7 +78,7 @@ def sibling_doubts(ingested: Ingested, *, seed: int = 0) -> tuple[Doubt, ...]:
         pulls = _pulls_of(table, regime)
         if len(pulls.log_force) < 6:
             continue
-        apart, log_factor = _split(pulls)
+        apart, log_factor = _split(pulls, plausible)
         if apart.any():
             names = set(pulls.test_id[apart].tolist())
             same = [group for group in groups if abs(group[1] - log_factor) < NEAR and group[0] & names]
@@ -88,8 +94,33 @@ def sibling_doubts(ingested: Ingested, *, seed: int = 0) -> tuple[Doubt, ...]:
                 found.setdefault(str(pulls.test_id[k]), {})[regime] = (deviation, expected, reach)
     for names, log_factor, regimes in groups:
         doubts.append(_of_group(campaign, sorted(names), log_factor, regimes, len(table)))
+    doubts += _copied(table)
     order = sorted(found, key=lambda name: -max(abs(d) for d, _, _ in found[name].values()))
     return (*doubts, *(_of_pull(ingested, name, found[name]) for name in order))
+
+
+def _copied(table: pd.DataFrame) -> Iterator[Doubt]:
+    """Samples whose forces are those of another sample at the same loads, digit by digit."""
+    if not len(table):
+        return
+    forces = table[["static_N", "sliding_N"]].to_numpy(float)
+    told = np.isfinite(forces).any(axis=1) & (table["normal_load_N"] > 0).to_numpy()
+    rows = table[told]
+    keys = pd.Series([tuple(pair) for pair in np.nan_to_num(forces[told], nan=0.0)], index=rows.index)
+    digits = [max(len(f"{x:.9g}".strip("-0.").replace(".", "")) for x in pair) for pair in keys]
+    samples = rows["sample"].to_numpy(str)
+    for sample in sorted(set(samples)):
+        own = keys[(samples == sample) & (np.array(digits) >= COPIED_DIGITS)]
+        for other in sorted(set(samples)):
+            theirs = set(keys[samples == other])
+            same = [key for key in own if key in theirs] if other > sample else []
+            if len(same) >= max(FEWEST_COPIED, COPIED_SHARE * len(own)):
+                found = f"{len(same)} of {len(own)} pairs of forces are those of sample {other}, digit by digit"
+                slip = "copied from one to the other?"
+                name = f"friction of sample {sample}"
+                both = tuple(rows["test_id"][[key in set(same) for key in keys]].astype(str))
+                where = "tests.csv, static_N and sliding_N, or the records"
+                yield Doubt("siblings", name, found, "numbers of its own", where, slip, tests=both)
 
 
 def _pulls_of(table: pd.DataFrame, regime: str) -> _Pulls:
@@ -101,8 +132,11 @@ def _pulls_of(table: pd.DataFrame, regime: str) -> _Pulls:
     )  # fmt: skip
 
 
-def _split(pulls: _Pulls) -> tuple[np.ndarray, float]:
-    """The smaller part of the pulls, (n,) of bool, where many cells fall into two parts, and ln of its factor."""
+def _split(pulls: _Pulls, plausible: tuple[float, float]) -> tuple[np.ndarray, float]:
+    """The wrong part of the pulls, (n,) of bool, where many cells fall into two parts, and ln of its factor.
+
+    Wrong is the part without which T/N is plausible, and the smaller one where both or none are.
+    """
     low, high = np.zeros((2, len(pulls.log_force)), bool)
     factors, several = [], 0
     for cell in range(pulls.cell.max() + 1):
@@ -120,9 +154,13 @@ def _split(pulls: _Pulls) -> tuple[np.ndarray, float]:
     either = []
     for part, log_factor in ((low, -factor), (high, factor)):
         beside = _beside_law(pulls, pulls.log_force - np.where(part, log_factor, 0.0))
-        whole_cells = np.abs(beside - log_factor) < NEAR
-        either.append((part | whole_cells, log_factor))
-    return min(either, key=lambda found: int(found[0].sum()))
+        wrong = part | (np.abs(beside - log_factor) < NEAR)
+        log_ratio = pulls.log_force - np.where(wrong, log_factor, 0.0) - np.log(pulls.load_N)
+        usual = [float(np.exp(np.median(log_ratio[pulls.sample == sample]))) for sample in np.unique(pulls.sample)]
+        odd = not all(plausible[0] <= ratio <= plausible[1] for ratio in usual)
+        either.append((odd, int(wrong.sum()), wrong, log_factor))
+    _, _, wrong, log_factor = min(either, key=lambda found: found[:2])
+    return wrong, log_factor
 
 
 def _far(pulls: _Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, float, float]]:
@@ -220,7 +258,7 @@ def _of_pull(ingested: Ingested, test_id: str, by_regime: Mapping[str, tuple[flo
     return Doubt(
         "siblings", f"{regime} friction of test {test_id} ({test.sample} at {test.normal_load_N:.3g} N)",
         f"{force:.3g} N, {size} {way} its siblings{also}", f"{low:.3g} to {high:.3g} N", f"tests.csv, {where}",
-        _slip(deviation, group=False),
+        _slip(deviation, group=False), tests=(test_id,),
     )  # fmt: skip
 
 
@@ -234,7 +272,7 @@ def _of_group(
     return Doubt(
         "siblings", f"{' and '.join(regimes)} friction of {len(test_ids)} of {tests} tests",
         f"about {_times(log_factor)} {way} than that of equal tests", "one unit and one range for all exports",
-        f"tests {named}", _slip(log_factor, group=True),
+        f"tests {named}", _slip(log_factor, group=True), tests=tuple(test_ids),
     )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ from tribo.traces.peak import (
 )
 from tribo.traces.phases import Course, as_stated, course_of, course_of_piece, phases_of
 from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
-from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
+from tribo.traces.signal import Signal, line, median_of_three, odd_signal, signal_of, steady
 from tribo.traces.sliding import (
     Sliding,
     oscillation_of,
@@ -673,8 +673,8 @@ def _from_static_peak(slip: Slip, pull: Pull, hold_s: float | None) -> Slip:
 
 
 def _doubts(trace: Trace, pull: Pull, test: Test, *, one_speed: bool) -> list[Problem]:
-    """Where what was recorded while sliding does not match the load or the speed of the test."""
-    found = []
+    """Where samples look like no measurement, or what was recorded while sliding does not match the test."""
+    found = odd_signal(trace)
     if one_speed and trace.displacement_m is not None and test.speed_m_s and math.isfinite(pull.window_s[0]):
         start, end = np.minimum(np.searchsorted(trace.time_s, pull.window_s), len(trace.time_s) - 1)
         time_s = float(trace.time_s[end] - trace.time_s[start])

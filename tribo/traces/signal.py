@@ -6,6 +6,7 @@ Before it what all steps use of samples: their noise, smoother forms, a line thr
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -32,6 +33,10 @@ _SHORTEST_STANDSTILL = 20
 _NO_NOISE = 1e-4  # noise over range below which a trace was never measured, and may stand still
 _AT_ZERO = 0.2  # share of the range below which a force may stand still: nothing pulls
 _SMOOTHED = 2000  # samples averaged before levels are searched: none up to this many, then this part of the trace
+_WRAP_SHARE = 0.4  # of the range of a record, by which a recorder that exceeds its range jumps at least
+_COARSE_STEP = 0.03  # of the range of a record, below which the step of a recorder is no matter
+_MOST_BLOCKS = 1000  # of a long record, whose noise they tell as well
+_REPEATED_BLOCK = 24  # samples of noise that are not twice the same by chance
 _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coarse to tell clipping
 
 
@@ -346,15 +351,22 @@ def without_spikes(force: FloatArray, spikes: NDArray[np.bool_]) -> FloatArray:
 
 
 def recorder_fault(trace: Trace, force: FloatArray) -> Problem | None:
-    """How the recorder failed, if it did: saturated at the largest force, or stuck at one value.
+    """How the recorder failed, if it did: beyond its range, saturated at the largest force, or stuck at one value.
 
-    ``force`` (n,) is that of the trace with impulses taken out; a stuck recorder shows in the force as recorded.
+    ``force`` (n,) is that of the trace with impulses taken out; the other two show in the force as recorded.
     """
+    raw = np.asarray(trace.force_N, float)
+    if wrap := wrapped(raw):
+        first, samples, range_N, beyond_N = wrap
+        jumps = f"the force jumps down by {range_N:.4g} N where it is largest, and back, for {samples} data points"
+        what = f"{jumps}: the range of the recorder was exceeded and it counted on from its other end"
+        found = f"{raw[first]:.6g} N after {raw[first - 1]:.6g} N; the peak is {beyond_N:.3g} N above the range"
+        return Problem("wrapped", what, trace.file or None, trace.first_row + first, "force", found)
     if clipped := flat_top(force):
         kind, (first, run) = "saturated", clipped
         stays = f"the force stays at its largest value for {run} data points"
         what = f"{stays}: the load cell or the recorder was saturated"
-    elif still := standstill(np.asarray(trace.force_N, float)):
+    elif still := standstill(raw):
         kind, (first, run) = "stuck", still
         what = f"the force keeps the same value for {run} data points: the sensor or the recorder stopped working"
     else:
@@ -410,3 +422,158 @@ def standstill(force: FloatArray) -> tuple[int, int] | None:
     if elsewhere.size < MINIMUM_SAMPLES or not _beyond_chance(run, pairs, force.size):
         return None
     return None if sample_noise(elsewhere) < _NO_NOISE * span else (start, run)
+
+
+def wrapped(force: FloatArray) -> tuple[int, int, float, float] | None:
+    """Where a force beyond the range of the recorder goes on from its other end (16 bit: -32768 follows 32767).
+
+    Returns the first sample there, the number of such samples, the range (N) and by how much (N) the force exceeds the
+    largest value that the range holds; None where there is no such part. Moved up by the range, every such part goes on
+    above the largest force beside it: a dropout does not.
+    """
+    span, noise = float(np.ptp(force)), noise_of(force)
+    steps = np.diff(force)
+    large = np.flatnonzero(np.abs(steps) > max(_WRAP_SHARE * span, SPIKE_OVER_NOISE * noise))
+    if large.size < 2 or large.size > force.size // 4 or steps[large[0]] > 0:
+        return None
+    down, up = large[::2], large[1::2]
+    if large.size % 2 or (steps[down] > 0).any() or (steps[up] < 0).any():
+        return None
+    beyond = np.zeros(force.size, bool)
+    for first, last in zip(down, up, strict=True):
+        beyond[first + 1 : last + 1] = True
+    small = np.abs(steps[~np.isin(np.arange(steps.size), large)])
+    usual = max(float(small.max()), 4.0 * noise)  # between two samples
+    top = float(force[~beyond].max())
+    range_N = float(np.median(np.abs(steps[large]))) + usual / 2.0
+    sizes = np.abs(steps[large])
+    edges = np.concatenate((force[down], force[up + 1]))
+    restored = force[beyond] + float(sizes.max())
+    if np.ptp(sizes) > 2.0 * usual or (edges < top - 2.0 * usual).any() or 3.0 * usual > range_N:
+        return None
+    if restored.min() < top - usual or restored.mean() <= top:
+        return None
+    return int(down[0]) + 1, int(beyond.sum()), range_N, float(restored.max()) - top
+
+
+def odd_signal(trace: Trace) -> list[Problem]:
+    """Doubts of a force that was read although its samples look like no measurement, each with its size in newtons.
+
+    ``clipped``: the largest samples vary less than noise elsewhere allows. ``toggles``: for a while the sensor gave the
+    same value and its neighbours only. ``coarse``: the steps of the recorder are larger than the noise and not small
+    against the force. ``repeated_samples``: a stretch of samples is there twice, or every sample.
+    """
+    force = np.asarray(trace.force_N, float)
+    found = [_clipped(force) or _toggling(force), _coarse(force), _repeated(force)]
+    file = trace.file or None
+    return [
+        Problem(kind, what, file, trace.first_row + at, "force", size)
+        for kind, what, at, size in filter(None, found)
+    ]  # fmt: skip
+
+
+Oddness = tuple[str, str, int, str]  # kind, sentence, sample, what was found
+
+
+def _resolution(force: FloatArray) -> float:
+    """The smallest difference between two values of a record; 0 where all are one."""
+    steps = np.diff(np.unique(force))
+    steps = steps[steps > 1e-9 * float(np.ptp(force))] if steps.size else steps
+    return float(steps.min()) if steps.size else 0.0
+
+
+def _block_noise(force: FloatArray, share: float = 0.5) -> float:
+    """Noise of a sample, exceeded in the rest of a share of blocks: not that of a still stretch, nor of a slip."""
+    blocks = np.array_split(force, max(1, min(force.size // 16, _MOST_BLOCKS)))
+    noise = [sample_noise(block) for block in blocks if block.size >= MINIMUM_SAMPLES // 2]
+    return float(np.quantile(noise, share)) if noise else 0.0
+
+
+def _narrowest(
+    force: FloatArray, noise: float, resolution: float, lengths: Sequence[int], above: float
+) -> tuple[int, int] | None:
+    """First sample and length of the stretch above a level that is narrower than normal noise ever makes it, or None.
+
+    The range of L normal samples is r or less with a chance of about L (r / (sqrt(2 pi) s))^(L - 1) for small r.
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    best: tuple[float, int, int] | None = None
+    for length in (n for n in lengths if n < force.size // 2):
+        origin = -(length // 2) + (1 - length % 2)
+        low = minimum_filter1d(force, length, origin=origin)[: force.size - length + 1]
+        width = maximum_filter1d(force, length, origin=origin)[: low.size] - low
+        width = np.where(low >= above, width, np.inf)
+        at = int(np.argmin(width))
+        share = (float(width[at]) + resolution) / (math.sqrt(2.0 * math.pi) * noise)
+        if not share < 0.5:
+            continue
+        log_chance = math.log(length * force.size) + (length - 1) * math.log(share)
+        if log_chance <= math.log(_CHANCE_OF_FLAT_TOP) and (best is None or log_chance < best[0]):
+            best = log_chance, at, length
+    return None if best is None else best[1:]
+
+
+def _clipped(force: FloatArray) -> Oddness | None:
+    noise, resolution = _block_noise(force), _resolution(force)
+    if not noise > 2.0 * resolution:
+        return None
+    top = float(force.max())
+    found = _narrowest(force, noise, resolution, (8, 10, 14, 20, 30, 50), top - 2.0 * noise)
+    if found is None:
+        return None
+    at, length = found
+    before = force[max(at - length, 0) : at]
+    rise = (float(np.median(force[at : at + length])) - float(before[: max(before.size // 4, 1)].mean())) if at else 0.0
+    if rise < 5.0 * noise:  # a level, not the top of a rise
+        return None
+    width = float(np.ptp(force[at : at + length]))
+    steady = f"the largest force varies by {width:.3g} N over {length} data points, and noise alone by more"
+    what = f"{steady}: the load cell or the recorder may have been saturated"
+    size = f"{top:.6g} N; the peak may be up to {rise * 0.5:.2g} N higher"
+    return "clipped", what, at, size
+
+
+def _toggling(force: FloatArray) -> Oddness | None:
+    noise, resolution = _block_noise(force, 0.8), _resolution(force)
+    if not noise > 2.0 * resolution:
+        return None
+    above = float(force.min()) + _AT_ZERO * float(np.ptp(force))
+    found = _narrowest(force, noise, resolution, (20, 30, 50, 100, 200), above)
+    if found is None:
+        return None
+    at, length = found
+    part = force[at : at + length]
+    if np.unique(part).size > 3 or standstill(force):
+        return None
+    width = float(np.ptp(part))
+    what = f"the force keeps within {width:.3g} N for {length} data points, with noise of {noise:.2g} N elsewhere"
+    return "toggles", f"{what}: the sensor may have stopped working", at, f"{part[0]:.6g} N"
+
+
+def _coarse(force: FloatArray) -> Oddness | None:
+    step, span = _resolution(force), float(np.ptp(force))
+    equal = float(np.mean(force[1:] == force[:-1])) if force.size > 1 else 0.0
+    if not (step > _COARSE_STEP * span and equal > _COARSE):
+        return None
+    what = f"the force was recorded in steps of {step:.3g} N, which are larger than its noise"
+    return "coarse", what, 0, f"friction forces are uncertain by up to {step / 2:.2g} N"
+
+
+def _repeated(force: FloatArray) -> Oddness | None:
+    noise = _block_noise(force)
+    if force.size < 4 * _REPEATED_BLOCK or not noise > 2.0 * _resolution(force):
+        return None
+    pairs = force[1:] == force[:-1]
+    if max(pairs[::2].mean(), pairs[1::2].mean()) > 0.9 and min(pairs[::2].mean(), pairs[1::2].mean()) < _COARSE:
+        what = "every data point is there twice: the uncertainties of means are too small by a third"
+        return "repeated_samples", what, 0, f"noise {noise:.2g} N"
+    windows = np.lib.stride_tricks.sliding_window_view(force, _REPEATED_BLOCK)[:: 1 if force.size < 200_000 else 7]
+    varied = np.flatnonzero(np.ptp(windows, axis=1) > noise)
+    places: dict[bytes, int] = {}
+    for at in varied.tolist():
+        first = places.setdefault(windows[at].tobytes(), at)
+        if first != at:
+            what = f"{_REPEATED_BLOCK} data points or more are those of an earlier part of the record, digit by digit"
+            return "repeated_samples", what, at, f"{force[at]:.6g} N, as {at - first} data points before"
+    return None
