@@ -112,6 +112,7 @@ def _unknown_decision(folder: Path) -> tuple[object, ...]:
     return folder, "--overrides", folder / "decisions.csv"
 
 
+TWO_CODINGS = ("\u00e91", "e\u03011")
 REFUSED, LEFT_OUT, DOUBTED = (1,), (1, 3), (0,)
 MISTAKES = (
     # what is given on the command line
@@ -227,7 +228,7 @@ MISTAKES = (
             each_row(lambda row: {"run_order": str(int(row["run_order"]) - 5)}),
             "column run_order", "0 or more", DOUBTED),
     Mistake("a specimen in two codings of letters",
-            each_row(lambda row: {"specimen": ("\u00e91" if row["mass_g"] == "25" else "e\u03011") if row["specimen"] == "F1" else row["specimen"]}),
+            each_row(lambda row: {"specimen": TWO_CODINGS[row["mass_g"] == "25"]} if row["specimen"] == "F1" else None),
             "column specimen", r"spelled differently\?", DOUBTED),
     # raw/
     Mistake("an export without units", export('"(s)","(mm)","(N)"\n', ""), "raw/T001.csv", "columns", REFUSED),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import click
 
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
-from tribo.cli.console import Console, ExportPath, GivenPath, command_options
+from tribo.cli.console import Console, ExportPath, GivenPath, command_options, open_streams
 from tribo.cli.design_commands import design, map_family
 from tribo.cli.setup_commands import init
 from tribo.cli.simulate_command import simulate
@@ -19,7 +20,13 @@ from tribo.user_text import did_you_mean
 
 
 class Commands(click.Group):
-    """A group that asks what was meant where a command is not known."""
+    """A group that asks what was meant where a command is not known, and runs without streams or /proc as well."""
+
+    def main(self, *given: Any, **named: Any) -> Any:
+        open_streams()
+        if sys.platform == "linux" and not Path("/proc/self").exists():
+            sys.modules.setdefault("dask", None)  # type: ignore[arg-type]  # pint imports it, and it asks /proc
+        return super().main(*given, **named)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

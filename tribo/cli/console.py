@@ -21,7 +21,7 @@ import textwrap
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -49,6 +49,7 @@ class GivenPath(click.Path):
         super().__init__(exists=True, file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        _refuse_not_utf8(value)
         try:
             is_folder = stat.S_ISDIR(os.stat(value).st_mode)
         except (FileNotFoundError, NotADirectoryError):
@@ -60,6 +61,26 @@ class GivenPath(click.Path):
         if self.dir_okay if is_folder else self.file_okay:
             return Path(value)
         return super().convert(value, param, ctx)
+
+
+class FolderPath(click.Path):
+    """A folder of results, there or not."""
+
+    def __init__(self) -> None:
+        super().__init__(file_okay=False, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        _refuse_not_utf8(value)
+        return super().convert(value, param, ctx)
+
+
+def _refuse_not_utf8(value: Any) -> None:
+    """End with a sentence where a place cannot be written down: records, pages and HDF5 files hold it as UTF-8."""
+    place = os.path.abspath(os.fspath(value))
+    try:
+        place.encode()
+    except UnicodeEncodeError as why:
+        raise click.ClickException(f"{printable(place)}: this path is not UTF-8; rename its folder or file") from why
 
 
 class ExportPath(GivenPath):
@@ -229,7 +250,7 @@ def findings_text(found: Checked, *, all_of_them: bool) -> str:
     return "\n".join(parts)
 
 
-FOLDER = click.Path(file_okay=False, path_type=Path)
+FOLDER = FolderPath()
 FORCE = click.option(
     "--force", is_flag=True,
     help="Write even where there are files that tribo has not written; those of the same name are replaced.",
@@ -278,6 +299,23 @@ def now() -> str:
     return now.isoformat(timespec="seconds")
 
 
+def open_streams() -> None:
+    """Open what is closed of the three standard streams, so that no file of results gets the number of one of them."""
+    for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_RDWR), number)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+
+
+def _drop(number: int) -> None:
+    """Let what is still to be written to a stream that takes nothing go nowhere, or the end of Python fails on it."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+
+
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
 INTERRUPTED = 130
 BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
@@ -303,7 +341,12 @@ class Console:
     def say(self, text: str, *, level: int = 0) -> None:
         """Print a line to standard error; level 1 is shown only with -v, level -1 even with -q."""
         if self.verbosity >= level:
-            click.echo(printable(text), err=True)
+            try:
+                click.echo(printable(text), err=True)
+            except BrokenPipeError:
+                raise
+            except OSError:  # a full device: results are worth more than messages
+                _drop(2)
 
     def list_tests(self, what: str, tests: Sequence[SetAside], *, level: int = 0) -> None:
         """The tests of one kind with their reasons, equal ones grouped; nothing where there are none."""
@@ -334,7 +377,16 @@ class Console:
             text = json.dumps(without_nan(record), indent=1, default=str)
         elif sys.stdout.isatty():
             text = wrapped(text, shutil.get_terminal_size().columns)
-        click.echo(text if self.as_json else printable(text))
+        if getattr(sys.stdout, "name", "") == os.devnull:
+            self.say("standard output is closed: the result is not shown, only its files are written", level=-1)
+        try:
+            click.echo(text if self.as_json else printable(text))
+        except BrokenPipeError:
+            raise
+        except OSError as why:
+            _drop(1)
+            why.filename = "standard output, after all files were written"
+            raise
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[str, int, int], None]]:
@@ -460,7 +512,8 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
             problems = problems_of(why)
             console.list_problems(problems)
             if console.as_json:
-                click.echo(json.dumps({"problems": [asdict(p) for p in problems]}, indent=1, default=str))
+                with suppress(OSError):  # said on standard error above
+                    click.echo(json.dumps({"problems": [asdict(p) for p in problems]}, indent=1, default=str))
             status = BUSY if isinstance(why, BusyError) else UNUSABLE
         except (KeyboardInterrupt, click.Abort):
             console.say("interrupted; finished results are kept and no file is incomplete", level=-1)

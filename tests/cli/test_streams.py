@@ -1,0 +1,79 @@
+"""Commands end with a sentence, and never with a traceback, where a stream, /proc or the name of a path is missing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support.sled import SledDesign, SledLaw, write_campaign
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="devices and shells of Linux")
+TOML = """\
+[campaign]
+title = "small"
+material = "PDMS"
+nominal_area_mm2 = 55.0
+slider_mass_g = 1.5
+[patterns.F]
+cavity = "none"
+"""
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("streams") / "campaign"
+    design = SledDesign({"F": SledLaw(4.8, 23e3, 2.9, 12e3)}, masses_g=(25.0, 138.5), specimens=2, repeats=1)
+    write_campaign(folder, design, TOML, seed=7)
+    return folder
+
+
+def started(campaign: str | Path, out: str | Path, streams: str) -> subprocess.CompletedProcess[bytes]:
+    words = [sys.executable, "-m", "tribo", "ingest", str(campaign), "-o", str(out), "--jobs", "1"]
+    arguments = [os.fsencode(word) for word in words]
+    return subprocess.run(["bash", "-c", f'"$@" {streams}', "bash", *arguments], capture_output=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("streams", "status", "said"),
+    [("2>&-", 0, ""), (">&-", 0, "standard output is closed: the result is not shown"), (">&- 2>&- <&-", 0, ""),
+     (">/dev/full", 1, "standard output, after all files were written: no space left on device"),
+     ("2>/dev/full", 0, ""), (">/dev/full 2>/dev/full", 1, "")],
+)  # fmt: skip
+def test_a_stream_that_is_closed_or_full_costs_no_file_of_results(
+    campaign: Path, tmp_path: Path, streams: str, status: int, said: str
+) -> None:
+    ended = started(campaign, tmp_path / "out", streams)
+    assert ended.returncode == status, ended.stderr
+    assert said in ended.stderr.decode()
+    assert b"Traceback" not in ended.stderr + ended.stdout
+    assert b"Exception ignored" not in ended.stderr
+    rows = (tmp_path / "out" / "tests.csv").read_text().splitlines()
+    assert len(rows) == 5
+    assert (tmp_path / "out" / "campaign.nc").read_bytes()[:4] == b"\x89HDF"
+    assert (tmp_path / "out" / "provenance.json").is_file()
+
+
+@pytest.mark.parametrize("place", ["campaign", "out"])
+def test_a_path_that_is_not_utf8_is_refused_in_a_sentence(campaign: Path, tmp_path: Path, place: str) -> None:
+    odd = os.fsdecode(os.fsencode(tmp_path) + b"/pr\xfcfung")
+    if place == "campaign":
+        shutil.copytree(campaign, odd)
+    given = (odd, tmp_path / "out") if place == "campaign" else (campaign, odd)
+    ended = started(*given, "")
+    assert ended.returncode == 1
+    assert b"this path is not UTF-8; rename its folder or file" in ended.stderr
+    assert b"Traceback" not in ended.stderr
+
+
+@pytest.mark.skipif(getattr(os, "getuid", lambda: 1)() != 0, reason="only root can hide /proc")
+def test_tests_are_read_where_there_is_no_proc(campaign: Path, tmp_path: Path) -> None:
+    command = f"mount -t tmpfs none /proc && {sys.executable} -m tribo ingest {campaign} -o {tmp_path}/out"
+    ended = subprocess.run(["unshare", "-m", "sh", "-c", command], capture_output=True, text=True, check=False)
+    if "unshare" in ended.stderr or "mount:" in ended.stderr:
+        pytest.skip("no namespace of mounts")
+    assert ended.returncode == 0, ended.stderr
+    assert "4 pulls" in ended.stdout
