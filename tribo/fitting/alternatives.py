@@ -359,7 +359,9 @@ def _reml(
         warnings.simplefilter("always")
         try:
             model = MixedLM(response, design, specimen, exog_re=design)
-            result, other = (model.fit(reml=True, method=[method]) for method in ("bfgs", "powell"))
+            result = model.fit(reml=True, method=["bfgs"])
+            warned = [str(w.message) for w in caught]
+            other = model.fit(reml=True, method=["lbfgs"])
         except (np.linalg.LinAlgError, ValueError):
             return None
     covariance = np.asarray(result.cov_params())[:2, :2]
@@ -368,5 +370,5 @@ def _reml(
     apart = np.abs(np.asarray(result.fe_params) - np.asarray(other.fe_params)) / np.sqrt(np.diag(covariance))
     if not (apart < _AGREEMENT).all() or not abs(result.llf - other.llf) < _AGREEMENT:
         return None
-    caught = [w for w in caught if "optimization failed" not in str(w.message) and "retrying" not in str(w.message)]
-    return np.asarray(result.fe_params), covariance, tuple(dict.fromkeys(str(w.message) for w in caught))
+    warned = [text for text in warned if "optimization failed" not in text and "etrying" not in text]
+    return np.asarray(result.fe_params), covariance, tuple(dict.fromkeys(warned))
