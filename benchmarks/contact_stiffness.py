@@ -2,21 +2,26 @@
 
     python benchmarks/contact_stiffness.py mesh docs/data/contact-stiffness.csv
     python benchmarks/contact_stiffness.py table docs/data/contact-stiffness.csv
+    python benchmarks/contact_stiffness.py measured docs/data/contact-stiffness.csv
 
 ``mesh``: the paper's patterns on a patch of 215 x 215 um (S: one repeat of 220 x 240 um with periodic edges) with the
 paper's layer, at l = 5, 2.5 and 1.25 um, 3 and 25 kPa, four runs a point over the same angles, to 1.5 peak times.
 Blocks have equal coefficients, or the paper's scatter: a finer mesh has more blocks, hence a weaker weakest one.
-What the file holds already is not computed again. ``table``: means, and how far halving moves them.
+What the file holds already is not computed again. ``table``: means, and how far halving moves them. ``measured``: which
+of the stiffnesses each measured pattern of Table 2 would choose, and how it then predicts the other patterns.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
+from tribo.berardo2019.published_tables import load_table2
 from tribo.springblock import PAPER, LocalFriction, SimConfig, simulate, stratified_design
 
 STIFFNESSES = (1.2e11, 3e10, None)  # Pa/m; the first is K_s / l2 of the paper's layer
@@ -24,6 +29,7 @@ SPACINGS_UM = (5.0, 2.5, 1.25)
 PRESSURES_PA = (3e3, 25e3)
 RUNS = 4
 EQUAL = LocalFriction(mu_s_sd=0.0, mu_d_sd=0.0)
+PATTERNS = ("A", "B", "C", "Sx", "Sy")
 KEYS = ["scatter", "stiffness", "sample", "pressure_kPa", "spacing_um"]
 
 
@@ -79,9 +85,43 @@ def table(path: Path) -> pd.DataFrame:
     return pd.concat(tables, axis=1)
 
 
+def measured(path: Path) -> pd.DataFrame:
+    """Root mean square of ln(predicted over measured) of T/N over that of the flat sample, at 3 and 25 kPa."""
+    runs = pd.read_csv(path).query("not scatter and spacing_um == 2.5")
+    model = runs.groupby(["stiffness", "sample", "pressure_kPa"])[["static", "sliding"]].mean()
+    laws = load_table2().query("source == 'experiment'").set_index(["sample", "regime"])
+    rows = []
+    for regime in ("static", "sliding"):
+        off = {
+            (kappa, sample): [
+                math.log(model.loc[(kappa, sample, p), regime] / model.loc[(kappa, "F", p), regime])
+                - math.log(law_at(laws, sample, regime, p) / law_at(laws, "F", regime, p))
+                for p in (3.0, 25.0)
+            ]
+            for kappa in (0.0, 1.2e11, 3e10)
+            for sample in PATTERNS
+        }
+
+        def rms(kappa: float, samples: list[str], off: dict[tuple[float, str], list[float]] = off) -> float:
+            return math.sqrt(np.mean([e * e for s in samples for e in off[kappa, s]]))
+
+        for sample in PATTERNS:
+            others = [s for s in PATTERNS if s != sample]
+            chosen = min((0.0, 1.2e11, 3e10), key=lambda kappa: rms(kappa, [sample]))
+            rows.append([regime, sample, chosen, rms(chosen, others), rms(0.0, others)])
+    return pd.DataFrame(rows, columns=["regime", "fitted on", "stiffness", "others", "others, rigid"])
+
+
+def law_at(laws: pd.DataFrame, sample: str, regime: str, pressure_kPa: float) -> float:
+    """T/N of a published law."""
+    return float(laws.loc[(sample, regime), "mu"] + laws.loc[(sample, regime), "tau0_kPa"] / pressure_kPa)
+
+
 if __name__ == "__main__":
     what, file = sys.argv[1:]
     if what == "mesh":
         mesh(Path(file))
+    elif what == "measured":
+        print(measured(Path(file)).round(3).to_string())
     else:
         print(table(Path(file)).to_string())
