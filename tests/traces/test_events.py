@@ -13,6 +13,7 @@ from support.coulomb_slider import Slider, noise_of_rigs, random_rig, record, sc
 from tribo import read_pull
 from tribo.records import STANDARD_GRAVITY, Phase, Test, Trace
 from tribo.traces import PullOptions, evaluate, slips_of
+from tribo.traces.events import read_between
 
 SLOW = Slider(duration_s=40.0, rate_Hz=500.0)
 CALM = replace(SLOW, noise=0.0, impulses=0.0)
@@ -122,3 +123,12 @@ def test_the_slips_of_the_paper_slider_are_those_counted_by_hand(rig: tuple[int,
     assert np.median([s.duration_s for s in slips]) == pytest.approx(half_s, rel=0.3)
     if rig == (168, 42):
         assert len(slips) == 226  # with falls from 0.05 of the weight on, by the README
+
+
+def test_a_force_that_falls_and_does_not_climb_tells_no_stiffness() -> None:
+    time = np.arange(2000) * 1e-3
+    force = np.where(time < 0.45, 0.0, np.interp(time, [0.45, 0.47, 0.6, 0.95, 0.97], [0.0, -0.4, -0.4, 0.0, -0.4]))
+    spans = [(0.0, 0.45, 0.47, 0.95), (0.6, 0.95, 0.97, 1.5)]
+    slips = read_between(time, force, spans, 1e-3, math.nan, from_rest=True)
+    assert slips[0].loading_N_per_s == 0.0
+    assert math.isnan(slips[0].slip_m)

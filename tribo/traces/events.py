@@ -145,6 +145,7 @@ def read_between(
         own = from_rest and first  # the rise from rest may be steeper or softer than the loadings
         creep = middle_N + (slope if own else rate) * (fail - middle_s) - peak
         stiffness = slope / speed_m_s if own and speed_m_s > 0 else stiffness_N_per_m
+        stiffness = stiffness if stiffness > 0 else math.nan  # a force that does not climb tells none
         drop, known = peak - trough, from_rest or not first
         found.append(Slip(
             begin if known else math.nan, fail, fail + lasts, slope / speed_m_s if speed_m_s > 0 else math.nan, points,
