@@ -159,8 +159,8 @@ def _with_highest(time: FloatArray, force: FloatArray, pull: Pull) -> Pull:
 
 
 def _smoothed_rise(force: FloatArray, pull: Pull, time: FloatArray) -> FloatArray:
-    """Force without impulses, as means over a hundredth of the rise."""
-    width = int(np.searchsorted(time, pull.peak_s) // 100)
+    """Force without impulses, as means over a fiftieth of the rise."""
+    width = int(np.searchsorted(time, pull.peak_s) // 50)
     return running_mean(median_of_three(force), width)
 
 
@@ -189,7 +189,10 @@ def _of_rise(time: FloatArray, force: FloatArray, pull: Pull, speed: float, tau:
     found["rise_stiffness_N_per_m"] = _normal(slope / speed, u / speed, count)
     ratio = upper / slope
     found["rise_bend"] = _normal(ratio - 1.0, abs(ratio) * math.hypot(upper_u / upper, u / slope), count + more)
-    noise = 1.4826 * float(np.median(np.abs(smooth - running_mean(smooth, max(smooth.size // 12, 3)))))
+    away = np.abs(smooth - running_mean(smooth, max(smooth.size // 12, 3)))[
+        smooth.size // 2 :
+    ]  # near the peak, where it is
+    noise = 1.4826 * float(np.median(away))
     least = max(_DROP * pull.static_N, _OVER_NOISE * noise)
     falls = turning_points(np.append(smooth, smooth[-1] - 2.0 * least), least)[0]  # the peak itself is the last one
     found["precursor_drops"] = Feature(float(falls.size - 1), 0.0, math.nan, math.nan, rise.size)
@@ -236,8 +239,10 @@ def _of_decay(time: FloatArray, force: FloatArray, pull: Pull, speed: float, tau
     found["static_drop_N"] = _normal(drop, math.hypot(top_u, pull.sliding_u_N), int(near.sum()) + last)
     below = top_N - _WIDTH_AT * drop
     if below > level:
-        width = _WIDTH_AT * drop / slope + length_s * math.log((top_N - level) / (below - level))
+        bent = np.gradient(course)
+        slope *= float(bent[-1] / bent[near].mean())  # the rise may bend between there and the peak
         rising, slope_u = _WIDTH_AT * drop / slope, math.sqrt(stretched / float(reach @ reach))
+        width = rising + length_s * math.log((top_N - level) / (below - level))
         u = math.hypot(rising * slope_u / slope, rising * top_u / drop, (width - rising) * length_u / length_s)
         found["peak_width_um"] = _normal(1e6 * speed * width, 1e6 * speed * u, int(near.sum()) + last)
     return found
@@ -326,7 +331,7 @@ def _of_sliding(time: FloatArray, force: FloatArray, pull: Pull) -> dict[str, Fe
     at, part = time[first : last + 1], force[first : last + 1]
     if part.size < 4 * _BLOCKS:
         return {}
-    inside = [s for s in pull.slips if at[0] <= s.fail_s <= at[-1]]
+    inside = [s for s in pull.slips[1:-1] if at[0] <= s.fail_s <= at[-1]]  # the first and last lack a line beside them
     found = {}
     if len(inside) > _FEWEST_SLIPS:  # the middles of slips do not depend on how high each of them began
         x, y = (np.array(v) for v in zip(*((s.fail_s + s.end_s, s.peak_N + s.trough_N) for s in inside), strict=True))
