@@ -18,7 +18,7 @@ from figures.test_figures import collisions
 from tribo.diagnostics import Diagnosis, examine
 from tribo.diagnostics.fit import fit, residual_on_flat
 from tribo.diagnostics.model import PATTERN
-from tribo.figures import evidence, extended_model, misfit, residuals
+from tribo.figures import evidence, extended_model, misfit, residuals, style
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style
 
@@ -280,3 +280,20 @@ def _inside(ax: object, text: Text) -> bool:
     if text in ax.get_yticklabels():  # type: ignore[attr-defined]
         return bool(y0 <= text.get_position()[1] <= y1)
     return True
+
+
+@pytest.mark.parametrize("name", ["power", "residuals", "finding"])
+def test_at_one_column_no_label_is_cut_off_and_no_title_or_tick_lies_on_another(
+    name: str, patterns_off: Diagnosis
+) -> None:
+    """With samples called as a manuscript may call them."""
+    with style.page(90.0):
+        rows = DIAGNOSIS_FIGURES[name].numbers(patterns_off)
+        for column in rows.columns.intersection(["sample", "x_name", "title"]):
+            rows[column] = rows[column].replace({"A": "across", "Sample A": "Sample across", "C": "along"})
+        figure = DIAGNOSIS_FIGURES[name].draw(rows)
+        figure.draw_without_rendering()
+        labels = [label for ax in figure.axes for label in (ax.xaxis.label, ax.yaxis.label) if label.get_text()]
+        boxes = [(label.get_text(), label.get_window_extent()) for label in labels]
+        assert [text for text, b in boxes if b.x0 < figure.bbox.x0 - 1 or b.x1 > figure.bbox.x1 + 1] == []
+        assert collisions(figure) == []

@@ -225,7 +225,11 @@ def _chance(ax: Axes, numbers: pd.DataFrame) -> None:
     ax.axvline(need, color="black", ls="--", lw=0.9)
     ax.axvline(observed, color=style.VERMILLION, lw=1.6)
     said = numbers.loc[numbers["mark"] == "answer", "name"].astype(str).tolist()  # none in tables of earlier versions
-    style.panel_title(ax, "A misfit?", said[0] if said else "yes" if observed > need else "no")
+    answer = said[0] if said else "yes" if observed > need else "no"
+    if style.page_mm() < style.PAGE_MM:  # part by part below each other
+        ax.set_title("\n".join(["A misfit?", *answer.split(", ")]), loc="left")
+    else:
+        style.panel_title(ax, "A misfit?", answer)
     ax.set_xlabel(f"Strongest deviation{_break()}(standard deviations)")
     ax.set_ylabel("Campaigns")
 
