@@ -61,7 +61,7 @@ def truth(target: Target, number: int, lengths: dict[str, float], seed: int, hal
     """T/N of everything that is wanted, in the order of the responses, at fresh seeds."""
     n, spacing, dt = rounds.MESHES["fine"]
     fine = 2 if halved else 1
-    config = SimConfig(duration_peaks=2.0).with_(
+    config = SimConfig(duration_peaks=2.0, cavity_shape="exact").with_(
         blocks=(n * fine, n * fine), spacing_m=spacing / fine, thickness_m=5e-6, dt_s=dt / fine, rest_tolerance=1e-2
     )
     spaces = [Space(family, k) for k, family in enumerate(target.pattern)]
@@ -128,7 +128,7 @@ def direction(count: int) -> Iterator[dict[str, object]]:
     target = target_of([want], (family,))
     space = Space(family, 0)
     n, spacing, dt = rounds.MESHES["coarse"]
-    config = SimConfig(duration_peaks=2.0).with_(
+    config = SimConfig(duration_peaks=2.0, cavity_shape="exact").with_(
         blocks=(n, n), spacing_m=spacing, thickness_m=5e-6, dt_s=dt, rest_tolerance=1e-2
     )
     with tempfile.TemporaryDirectory() as folder:

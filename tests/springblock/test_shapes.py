@@ -71,6 +71,16 @@ def test_every_family_comes_from_a_design_to_its_friction(name: str):
     assert total == pytest.approx(expected, rel=1e-9)
 
 
+def test_walls_narrower_than_the_blocks_keep_their_share_or_are_refused():
+    """Walls of 3 um between squares on blocks of 5 um: the share of the shape where it is exact, else a sentence."""
+    pattern = Pattern("P", "square", (12 * UM, 12 * UM), (15 * UM, 15 * UM))
+    config = SimConfig(sample="P", pattern=pattern, blocks=(24, 24))
+    with pytest.raises(SimulationError, match="no block touches"):
+        simulate(config)
+    exact = mask_of(config.with_(cavity_shape="exact"))
+    assert float(exact.mean()) == pytest.approx(1 - (12 / 15) ** 2, rel=0.05)
+
+
 def test_paper_patterns_keep_their_blocks():
     """Squares for circles by default; exact circles on request, with the area of circles."""
     config = SimConfig(sample="B", blocks=(84, 84))

@@ -92,7 +92,8 @@ def map_family(
     with console.progress() as progress:
         wanted = [("static", 1e3 * pressure_kPa, "all"), ("sliding", 1e3 * pressure_kPa, "all")]
         all_rounds = Rounds([Space(family, 0)], wanted, kept, seed, jobs)
-        rows = mapped(all_rounds, (first, "pitch_um"), points, SimConfig(duration_peaks=2.0), progress)
+        base = SimConfig(duration_peaks=2.0, cavity_shape="exact")
+        rows = mapped(all_rounds, (first, "pitch_um"), points, base, progress)
     made = [row for row in rows if not row["fault"]]
     if not made:
         raise CampaignError(Problem("cannot_be_made", f"no pattern of this map can be made: {rows[0]['fault']}"))

@@ -71,7 +71,7 @@ def design(target: Target, folder: Path, kept: Path, seed: int, jobs: int, say: 
     names = {f.name for part in (SimConfig, LocalFriction) for f in fields(part)}
     if unknown := [name for name in target.parameters if name not in names]:
         raise SimulationError(Problem("unknown_key", "unknown parameter", column="parameters", found=unknown[0]))
-    base = with_parameters(SimConfig(duration_peaks=2.0), target.parameters)
+    base = with_parameters(SimConfig(duration_peaks=2.0, cavity_shape="exact"), target.parameters)
     report = None if target.material.report is None else folder / target.material.report
     laws = {} if report is None else laws_of_report(report, target.material.flat)
     for regime in ("static", "sliding"):

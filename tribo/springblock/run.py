@@ -45,6 +45,14 @@ def simulate(config: SimConfig, threads: int = 1) -> Run:
     """
     config.check()
     lattice = lattice_of(config)
+    if not lattice.contact.any():
+        raise SimulationError(
+            Problem(
+                "no_contact", "no block touches: the walls of this pattern are narrower than the blocks",
+                column="spacing_m", found=f"{config.spacing_m * 1e6:g} um",
+                allowed='a finer spacing, or cavity_shape "exact"',
+            )
+        )
     trajectory = ENGINES[config.engine].integrate(config, lattice, thresholds_of(config, lattice), threads)
     return run_of(config, trajectory, float(lattice.area_fraction))
 
