@@ -43,6 +43,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("plausibility", GROUND),
     ("springblock", GROUND | {"campaign", "cache"}),
     ("slider", GROUND | {"springblock"}),
+    ("tracelaws", GROUND | {"slider", "traces"}),
     ("mechanisms", GROUND),
     ("mechanisms_in_model", GROUND | {"mechanisms", "springblock"}),
     ("comparison", GROUND | {"fitting", "springblock", "cache"}),
@@ -53,7 +54,10 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("wording", GROUND | {"mechanisms", "comparison", "diagnostics", "lawsearch", "berardo2019"}),
     ("figures", GROUND | {"fitting", "comparison", "diagnostics", "lawsearch", "berardo2019", "wording"}),
     ("plot", GROUND | {"diagnostics", "berardo2019", "figures"}),
-    ("report", GROUND | {"cache", "comparison", "diagnostics", "lawsearch", "berardo2019", "wording", "figures"}),
+    (
+        "report",
+        GROUND | {"tracelaws", "cache", "comparison", "diagnostics", "lawsearch", "berardo2019", "wording", "figures"},
+    ),
 )
 MAY_IMPORT = dict(STREET)
 BELOW = set(MAY_IMPORT)

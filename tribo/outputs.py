@@ -361,6 +361,16 @@ COMPARISON = {
     "ratio_low": "lower end of its 95 % interval",
     "ratio_high": "upper end",
 }
+TRACE_LAWS = {
+    "test_id": "the test, or the record of which it is a level",
+    "law": "coulomb, ageing, dieterich or ruina; laws that are tied are all listed",
+    "parameter": "parameter of the law or the machine, with its unit at the end of the name",
+    "value": "best value, in `unit`",
+    "low": "lower end of its 95 % interval",
+    "high": "upper end",
+    "unit": "SI unit",
+    "told": "yes, or cannot be told: the record does not hold this parameter",
+}
 RESIDUALS = {
     "test_id": "the test",
     "sample": "sample",
@@ -482,6 +492,11 @@ PRODUCTS = (
     Product(
         "other_fits.csv", "fit", "the same with other weights and laws, and the fits of the model.",
         OTHER_FITS, "tribo.report.tables:other_fits_table", "other_fits", "parameter_row",
+    ),
+    Product(
+        "tracelaws.csv", "fit",
+        "friction law and machine read from records with stick-slip or steps of speed; with `--trace-law`.",
+        TRACE_LAWS, "tribo.report.tables:trace_laws_table",
     ),
     Product(
         "laws.csv", "fit",

@@ -840,6 +840,66 @@ CONDITIONS = (
 _PLAIN_NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d{1,2})?")  # 001 is a name
 
 
+@dataclass(frozen=True)
+class TraceLawParameter:
+    """One parameter of a law or machine that was read from a whole trace.
+
+    Parameters
+    ----------
+    name : str
+        Its name, with the unit at its end.
+    value, low, high : float
+        Best value and 95 % interval, in ``unit``.
+    unit : str
+        SI unit, "1" where it has none.
+    told : bool
+        Whether the record holds it; where not, it cannot be told and the interval says how far it is bound.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    told: bool
+
+
+@displayed(lambda law: f"{law.law}: " + ", ".join(f"{p.name} {p.value:.4g}" for p in law.parameters))
+@dataclass(frozen=True)
+class TraceLaw:
+    """A friction law and the machine under it, read from one whole trace.
+
+    Parameters
+    ----------
+    law : str
+        Name of the law, as in :data:`tribo.slider.SLIDER_LAWS`.
+    parameters : tuple of TraceLawParameter
+        Parameters of law and machine with intervals.
+    log_likelihood : float
+        Of slips: log density of all slips, each by a fit without its part of the record. Of steps of speed: of the
+        whole record, without the terms that two laws share.
+    samples : int
+        Slips or samples that count.
+    evidence : str
+        "slips" or "steps of speed".
+    scores : tuple of float
+        Log density of each slip left out of the fit; empty for steps of speed.
+    test_id : str
+        The test.
+    """
+
+    law: str
+    parameters: tuple[TraceLawParameter, ...]
+    log_likelihood: float
+    samples: int
+    evidence: str
+    scores: tuple[float, ...] = ()
+    test_id: str = ""
+
+    def __getitem__(self, name: str) -> TraceLawParameter:
+        return next(p for p in self.parameters if p.name == name)
+
+
 @displayed(lambda s: f"{s.ingested.campaign.title}, {len(s.ingested.pulls)} pulls, {len(s.fits)} fits")
 @dataclass(frozen=True)
 class Study:
@@ -882,6 +942,8 @@ class Study:
         Numbers outside their broad physical bounds, or far from those of equal tests.
     undiagnosed : str
         Why there is no diagnosis.
+    trace_laws : tuple of TraceLaw
+        Laws and machines read from whole traces, where they were asked for.
 
     Examples
     --------
@@ -906,6 +968,7 @@ class Study:
     notes: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
     undiagnosed: str = ""
+    trace_laws: tuple[TraceLaw, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fits", Fits(self.fits))  # the record is frozen

@@ -81,6 +81,8 @@ class StudyOptions:
         Folder of finished simulations and diagnosis, used again by the next start.
     scheduler : str, optional
         Address of a dask scheduler that runs the simulations.
+    trace_law : str
+        Law to read from whole traces, "auto" or a name in ``tribo.tracelaws``; empty: none.
 
     Examples
     --------
@@ -103,6 +105,7 @@ class StudyOptions:
     overrides: Path | None = None
     kept: Path | None = None
     scheduler: str | None = None
+    trace_law: str = ""
 
     @property
     def model_runs(self) -> ModelRuns:
@@ -115,6 +118,7 @@ class StudyOptions:
         """The options as text, for the provenance."""
         laws = {"laws": str(self.laws)} if self.laws is not None else {}
         zeros = {name: text for name, text in (("zero", self.zero), ("load_zero", self.load_zero)) if text}
+        laws |= {"trace_law": self.trace_law} if self.trace_law else {}
         return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros, **laws}
 
 
@@ -388,10 +392,16 @@ def study(
         without = without_model(ingested.campaign, options) if until != "fit" else ""
         fits = Fits()
         no_law = ""
+        if options.trace_law:
+            from tribo.tracelaws import trace_laws_of
+
+            read = trace_laws_of(ingested, options.trace_law)
+        else:
+            read = ()
         try:
             fits = fit(ingested, weights=options.weights)
         except FitError as why:
-            if not without:
+            if not without and not read:
                 raise
             no_law = f"No friction law over load was fitted: {why}."
         if until == "fit" or without:
@@ -404,7 +414,7 @@ def study(
                     raise  # of a file or a cluster, not of the law of the flat sample
                 without = f"The spring-block model cannot be run with the friction law of the flat sample: {why}."
                 fitted = Study(ingested, fits, notes=(without,))
-        return assess(with_doubts(fitted), options)
+        return assess(with_doubts(replace(fitted, trace_laws=read)), options)
 
 
 @contextmanager

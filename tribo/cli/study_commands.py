@@ -70,6 +70,11 @@ def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 @CAMPAIGN
 @OUT
 @DRY_RUN
+@click.option(
+    "--trace-law", type=click.Choice(["auto", "coulomb", "ageing", "dieterich", "ruina"]), default="",
+    help="Read a law and the machine from whole records with stick-slip (coulomb, ageing) or steps of speed "
+    "(dieterich, ruina), with intervals; auto: the law that fits. Writes tracelaws.csv.",
+)
 @fit_options
 @command_options
 def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:

@@ -127,6 +127,15 @@ def _restart_cells(pull: Pull) -> dict[str, object]:
     return {"restarts": len(pull.restarts), **found}
 
 
+def trace_laws_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """One row per parameter of every law that was read from a whole trace; None where none was."""
+    from tribo.tracelaws.of_campaign import rows_of
+
+    if not study.trace_laws:
+        return None
+    return pd.DataFrame(rows_of(study.trace_laws), columns=outputs.product("tracelaws.csv").column_names)
+
+
 def restarts_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
     """One row per restart after a stop of the drive, with the time it stood still; None where there is none."""
     pulls, names = study.ingested.pulls, outputs.product("restarts.csv").column_names

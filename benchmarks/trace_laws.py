@@ -1,0 +1,144 @@
+"""How often the intervals of laws read from traces hold, and how often the right law is chosen.
+
+Virtual records come from ``tests/support/virtual_slips.py``, which shares nothing with the code that reads them. Every
+record draws its own law, machine and noise::
+
+    python benchmarks/trace_laws.py run --count 250 -o rows.jsonl       # of each of the four laws; continues rows.jsonl
+    python benchmarks/trace_laws.py table rows.jsonl
+
+Rows are appended one by one; a stopped exam goes on where it ended. Seeds of records: 26000 + number.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from support.virtual_slips import slips, velocity_step
+
+from tribo.slider import speed_steps
+from tribo.tracelaws import slip_fits, step_fits
+from tribo.tracelaws.of_campaign import chosen_slip_laws, chosen_step_laws
+
+TRUTHS = ("coulomb", "ageing", "dieterich", "ruina")
+
+
+def slip_record(rng: np.random.Generator, truth: str):
+    """A record of about 70 slips at 1 kHz, and its truth."""
+    load, mass = float(rng.uniform(0.1, 3.0)), float(10 ** rng.uniform(-2, -0.5))
+    mu_s = float(rng.uniform(0.3, 0.6))
+    drop = mu_s * float(rng.uniform(0.08, 0.25))
+    swing = float(rng.uniform(0.03, 0.12))
+    stiffness = mass * (2 * math.pi / swing) ** 2
+    damping = 2 * float(rng.uniform(0.02, 0.25)) * math.sqrt(stiffness * mass)
+    period = float(rng.uniform(4.0, 12.0)) * swing
+    speed = 2 * drop * load / (stiffness * period)
+    b = float(rng.uniform(0.05, 0.3)) * drop if truth == "ageing" else 0.0
+    mu_0 = mu_s - b * math.log(period / 1e-3)
+    given = {
+        "mass_kg": mass, "stiffness": stiffness, "damping": damping, "load_N": load, "speed_m_s": speed, "mu_s": mu_0,
+        "mu_d": mu_s - drop, "b": b, "scatter": float(rng.uniform(0.03, 0.15)) * drop, "duration_s": 70 * period,
+        "rate_Hz": 1000.0, "noise_N": float(rng.uniform(0.003, 0.02)) * drop * load,
+    }  # fmt: skip
+    t, force = slips(rng, **given)
+    first = int(np.argmax(force > (mu_s - drop) * load))  # loading from a slack spring is no part of stick-slip
+    record = t[first:], force[first:]
+    known = {"mu_d": mu_s - drop, "stiffness_N_per_m": stiffness, "mass_kg": mass, "damping_N_s_per_m": damping}
+    known |= {"mu_s": mu_0} if truth == "coulomb" else {"mu_s_after_1_s": mu_0 + b * math.log(1e3), "b": b}
+    return record, known, (load, speed)
+
+
+def step_record(rng: np.random.Generator, truth: str):
+    """A tenfold or threefold step of speed at 10 Hz, and its truth."""
+    a = float(rng.uniform(0.004, 0.012))
+    b = a + float(rng.uniform(-0.003, 0.004))
+    Dc = float(10 ** rng.uniform(math.log10(3e-6), math.log10(4e-5)))
+    stiffness = (1.5 if truth == "dieterich" else 5.0) * float(10 ** rng.uniform(0, 0.8)) * max(b - a, 0.001) / Dc
+    speeds = (1e-6, float(rng.choice([3e-6, 1e-5])))
+    noise = float(10 ** rng.uniform(-4, -3.3))
+    drift = float(rng.normal(0.0, 3.0))
+    record = velocity_step(
+        rng, ageing=truth == "dieterich", a=a, b=b, Dc_m=Dc, stiffness_per_m=stiffness, mu0=0.6, speeds_m_s=speeds,
+        step_s=80.0, duration_s=80.0 + 1e-3 / speeds[1], rate_Hz=10.0, noise=noise, drift_per_m=drift,
+    )  # fmt: skip
+    known = {"a": a, "b": b, "a_minus_b": a - b, "Dc_m": Dc, "stiffness_per_m": stiffness}
+    return record, known, (speed_steps([0.0, 80.0], list(speeds)), noise)
+
+
+def examined(truth: str, number: int) -> dict:
+    """One record: what was fitted under its own law beside the truth, and which laws were chosen."""
+    rng = np.random.default_rng([26000 + number, TRUTHS.index(truth)])
+    began = time.process_time()
+    if truth in slip_fits.LAWS:
+        (t, force), known, (load, speed) = slip_record(rng, truth)
+        made = [slip_fits.fit_slips(t, force, law, load, speed) for law in slip_fits.LAWS]
+        if made[0] is None:
+            return {"truth": truth, "number": number, "chosen": []}
+        chosen = [law.law for law in chosen_slip_laws(made)]
+    else:
+        (t, mu), known, (drive, noise) = step_record(rng, truth)
+        known["noise"] = noise
+        made = step_fits.fit_laws(t, mu, drive, step_fits.LAWS)
+        chosen = [law.law for law in chosen_step_laws(made)]
+    own = next(law for law in made if law.law == truth)
+    rows = {p.name: [known[p.name], p.value, p.low, p.high, bool(p.told)] for p in own.parameters if p.name in known}
+    return {"truth": truth, "number": number, "chosen": chosen, "cpu_s": time.process_time() - began, "rows": rows}
+
+
+def table(rows: list[dict]) -> str:
+    """Coverage, share that can be told, median error, and the choice of law, by law and parameter."""
+    lines = ["| law | parameter | records | told | 95 % interval holds | median error |", "|---|---|---|---|---|---|"]
+    choices = ["| law | records | right law alone | tied | wrong | read as nothing |", "|---|---|---|---|---|---|"]
+    for truth in TRUTHS:
+        of = [row for row in rows if row["truth"] == truth]
+        if not of:
+            continue
+        for name in {name: None for row in of for name in row.get("rows", {})}:
+            found = [row["rows"][name] for row in of if name in row.get("rows", {})]
+            told = [r for r in found if r[4]]
+            inside = sum(r[2] <= r[0] <= r[3] for r in told)
+            share = f"{100 * inside / len(told):.1f} % ({inside} of {len(told)})" if told else "-"
+            error = f"{100 * np.median([abs(r[1] / r[0] - 1) for r in told]):.2f} %" if told else "-"
+            seen = f"{100 * len(told) / len(found):.0f} %"
+            lines.append(f"| {truth} | `{name}` | {len(found)} | {seen} | {share} | {error} |")
+        alone = sum(row["chosen"] == [truth] for row in of)
+        tied = sum(truth in row["chosen"] and len(row["chosen"]) > 1 for row in of)
+        nothing = sum(not row["chosen"] for row in of)
+        choices.append(f"| {truth} | {len(of)} | {alone} | {tied} | {len(of) - alone - tied - nothing} | {nothing} |")
+    return "\n".join([*lines, "", *choices])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("what", choices=["run", "table"])
+    parser.add_argument("file", nargs="?", type=Path)
+    parser.add_argument("-o", "--out", type=Path)
+    parser.add_argument("--count", type=int, default=250)
+    parser.add_argument("--first", type=int, default=0)
+    given = parser.parse_args()
+    file = given.file or given.out
+    kept = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    if given.what == "table":
+        print(table(kept))
+        return
+    warnings.simplefilter("ignore")
+    done = {(row["truth"], row["number"]) for row in kept}
+    with file.open("a") as out:
+        for number in range(given.first, given.first + given.count):
+            for truth in TRUTHS:
+                if (truth, number) not in done:
+                    out.write(json.dumps(examined(truth, number)) + "\n")
+                    out.flush()
+
+
+if __name__ == "__main__":
+    main()

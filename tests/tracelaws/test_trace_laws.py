@@ -1,0 +1,132 @@
+"""Laws and machines read from virtual records of known answer, and what a record cannot tell."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import on_the_command_line
+import pytest
+from support.virtual_slips import slips, velocity_step
+
+from tribo.slider import SliderConfig, constant_speed, simulate_slider, speed_steps
+from tribo.tracelaws import fit_slips, fit_steps
+from tribo.tracelaws.of_campaign import chosen_step_laws
+from tribo.tracelaws.slip_fits import clearly_better, slip_force
+from tribo.tracelaws.step_fits import fit_laws, whitening
+
+COULOMB = {"mass_kg": 0.03, "stiffness": 170.0, "damping": 0.3, "load_N": 0.3, "speed_m_s": 1e-3, "mu_s": 0.36,
+           "mu_d": 0.30, "scatter": 0.004, "duration_s": 12.0, "noise_N": 3e-4}  # fmt: skip
+TRUTH = {"mu_s": 0.36, "mu_d": 0.30, "stiffness_N_per_m": 170.0, "mass_kg": 0.03, "damping_N_s_per_m": 0.3}
+STEP = {"ageing": True, "a": 0.008, "b": 0.011, "Dc_m": 12e-6, "stiffness_per_m": 2e3, "mu0": 0.6,
+        "speeds_m_s": (1e-6, 1e-5), "step_s": 60.0, "duration_s": 110.0, "rate_Hz": 5.0, "noise": 3e-4,
+        "drift_per_m": 2.0}  # fmt: skip
+DRIVE = speed_steps([0.0, 60.0], [1e-6, 1e-5])
+
+
+def record(seed: int, rate_Hz: float) -> tuple[np.ndarray, np.ndarray]:
+    """Stick-slip after its first loading."""
+    time, force = slips(np.random.default_rng(seed), rate_Hz=rate_Hz, **COULOMB)
+    first = int(np.argmax(force > 0.3 * 0.3))
+    return time[first:], force[first:]
+
+
+def test_the_closed_form_of_a_slip_is_that_of_the_simulated_slider():
+    run = simulate_slider(
+        SliderConfig(0.03, 170.0, 0.3, 0.3, values={"mu_s": 0.36, "mu_d": 0.3}, drive=constant_speed(1e-3),
+                     duration_s=1.2, rate_Hz=5000.0)
+    )  # fmt: skip
+    gamma = 0.3 / 0.06
+    omega = math.sqrt(170.0 / 0.03 - gamma**2)
+    inside = (run.time_s > 0.5) & (run.time_s < run.starts_s[1])
+    expected = slip_force(run.time_s[inside], run.starts_s[0], 0.108, 0.09, omega, gamma, 0.17)
+    np.testing.assert_allclose(run.force_N[inside], expected, rtol=0, atol=1e-5 * 0.108)
+
+
+def test_coulomb_friction_and_the_machine_are_recovered_from_slips():
+    found = fit_slips(*record(3, 1000.0), "coulomb", 0.3, 1e-3)
+    assert found is not None
+    for name, truth in TRUTH.items():
+        p = found[name]
+        assert p.told
+        if name != "damping_N_s_per_m":  # so few slips hold it to a third only
+            assert p.value == pytest.approx(truth, rel=0.01)
+            assert p.high - p.low < 0.02 * truth
+        half = 0.5 * (p.high - p.low)
+        assert abs(p.value - truth) < 2.0 * half  # four standard errors
+
+
+def test_a_slow_recorder_tells_no_mass_and_bounds_sliding_friction():
+    found = fit_slips(*record(3, 60.0), "coulomb", 0.3, 1e-3)
+    assert found is not None
+    assert not found["mass_kg"].told
+    assert not found["damping_N_s_per_m"].told
+    assert not found["mu_d"].told
+    assert found["mu_d"].low < 0.30 < found["mu_d"].high
+    assert found["stiffness_N_per_m"].value == pytest.approx(170.0, rel=0.02)
+
+
+def test_growth_at_rest_is_not_told_by_slips_of_equal_hold_and_coulomb_is_not_beaten():
+    time, force = record(5, 1000.0)
+    coulomb, ageing = (fit_slips(time, force, law, 0.3, 1e-3) for law in ("coulomb", "ageing"))
+    assert coulomb is not None
+    assert ageing is not None
+    assert ageing["b"].low < 0.0 < ageing["b"].high
+    assert not clearly_better(ageing, coulomb)
+
+
+def test_steady_sliding_has_no_slips():
+    rng = np.random.default_rng(0)
+    time = np.arange(5000) / 1000.0
+    assert fit_slips(time, 0.3 + 1e-3 * rng.standard_normal(5000), "coulomb", 1.0, 1e-3) is None
+
+
+def test_rate_and_state_is_recovered_from_a_step_of_speed_and_the_other_law_is_refused():
+    time, mu = velocity_step(np.random.default_rng(1), **STEP)
+    made = fit_laws(time, mu, DRIVE, ("dieterich", "ruina"))
+    assert [law.law for law in chosen_step_laws(made)] == ["dieterich"]
+    for name, truth in (("a", 0.008), ("b", 0.011), ("a_minus_b", -0.003), ("Dc_m", 12e-6), ("stiffness_per_m", 2e3)):
+        p = made[0][name]
+        assert p.told
+        assert p.value == pytest.approx(truth, rel=0.06)
+        assert p.low - 0.5 * (p.high - p.low) < truth < p.high + 0.5 * (p.high - p.low)
+
+
+def test_the_stiffness_of_a_rigid_machine_and_the_slip_of_an_evolution_that_is_not_there_cannot_be_told():
+    rigid = {**STEP, "stiffness_per_m": 2e4, "duration_s": 90.0, "noise": 1e-3}
+    time, mu = velocity_step(np.random.default_rng(2), **rigid)
+    assert not fit_steps(time, mu, DRIVE, "dieterich")["stiffness_per_m"].told
+    time, mu = velocity_step(np.random.default_rng(2), **{**STEP, "b": 0.0, "noise": 1e-3})
+    assert not fit_steps(time, mu, DRIVE, "dieterich", 2e3)["Dc_m"].told
+
+
+def test_whitened_noise_has_no_memory():
+    rng = np.random.default_rng(7)
+    r = np.zeros(20000)
+    for i in range(1, r.size):
+        r[i] = 0.7 * r[i - 1] + rng.standard_normal()
+    white = whitening(r)(r)
+    assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.02
+    assert white.std() == pytest.approx(1.0, rel=0.02)
+
+
+def test_the_command_writes_the_laws_of_a_record_with_stick_slip(tmp_path: Path):
+    time, force = slips(np.random.default_rng(11), rate_Hz=500.0, **COULOMB)
+    folder = tmp_path / "c"
+    (folder / "raw").mkdir(parents=True)
+    (folder / "campaign.toml").write_text(
+        '[campaign]\ntitle = "t"\nnominal_area_mm2 = 100\npull_speed_mm_s = 1.0\n[patterns.F]\ncavity = "none"\n'
+    )
+    (folder / "tests.csv").write_text("test_id,file,sample,normal_load_N,specimen\nT1,raw/a.csv,F,0.3,F1\n")
+    rows = [f"{t:.4f},{f:.7f},{t:.4f}" for t, f in zip(time, force, strict=True)]
+    (folder / "raw" / "a.csv").write_text("Time (s),Load (N),Extension (mm)\n" + "\n".join(rows) + "\n")
+    result = on_the_command_line.run("fit", folder, "-o", tmp_path / "out", "--trace-law", "coulomb")
+    assert result.exit_code == 0, result.stderr
+    with open(tmp_path / "out" / "tracelaws.csv", newline="") as file:
+        found = {row["parameter"]: row for row in csv.DictReader(file)}
+    assert float(found["mu_s"]["value"]) == pytest.approx(0.36, rel=0.02)
+    assert float(found["mass_kg"]["low"]) < 0.0305
+    assert found["mu_d"]["told"] == "yes"
+    assert {row["law"] for row in found.values()} == {"coulomb"}
