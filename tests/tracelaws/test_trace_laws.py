@@ -53,7 +53,7 @@ def test_coulomb_friction_and_the_machine_are_recovered_from_slips():
         assert p.told
         if name != "damping_N_s_per_m":  # so few slips hold it to a third only
             assert p.value == pytest.approx(truth, rel=0.01)
-            assert p.high - p.low < 0.02 * truth
+            assert p.high - p.low < 0.05 * truth
         half = 0.5 * (p.high - p.low)
         assert abs(p.value - truth) < 2.0 * half  # four standard errors
 

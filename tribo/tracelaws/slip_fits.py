@@ -126,9 +126,9 @@ def _shape(
 ) -> FloatArray | None:
     """Static and sliding force, frequency and damping rate of one slip, by least squares about it.
 
-    Noise shifts the estimates of one slip, and does so in all slips alike. How far is found by a second fit, to the first
-    one with its residuals in reversed order, and taken off (Efron and Tibshirani, An Introduction to the Bootstrap, 1993,
-    chapter 10).
+    Noise shifts the estimates of one slip, and does so in all slips alike. How far is found by a second fit, to the
+    first one with its residuals in reversed order, and taken off (Efron and Tibshirani, An Introduction to the
+    Bootstrap, 1993, chapter 10).
     """
     width = q - p
     a, b = max(p - max(2 * width, 20), start + (p - start) // 3), min(q + width // 2, time.size)
@@ -149,7 +149,7 @@ def _shape(
     first = fitted(f, begin)
     if not first[1] > first[2] or np.isclose(first[3:], [low[3], high[4]], rtol=1e-6).any():
         return None
-    model = slip_force(t, *first, pace)
+    model = slip_force(t, first[0], first[1], first[2], first[3], first[4], pace)
     x = 2.0 * first - fitted(model + (f - model)[::-1], np.clip(first, low + 1e-9 * scale, high - 1e-9 * scale))
     return np.array([x[1], x[2], math.sqrt(x[3] ** 2 + x[4] ** 2), x[4]])
 
