@@ -12,7 +12,7 @@ import pytest
 from support.virtual_slips import slips, velocity_step
 
 from tribo.slider import SliderConfig, constant_speed, simulate_slider, speed_steps
-from tribo.tracelaws import fit_slips, fit_steps
+from tribo.tracelaws import fit_slips
 from tribo.tracelaws.of_campaign import chosen_step_laws
 from tribo.tracelaws.slip_fits import clearly_better, slip_force
 from tribo.tracelaws.step_fits import fit_laws, whitening
@@ -92,14 +92,6 @@ def test_rate_and_state_is_recovered_from_a_step_of_speed_and_the_other_law_is_r
         assert p.told
         assert p.value == pytest.approx(truth, rel=0.06)
         assert p.low - 0.5 * (p.high - p.low) < truth < p.high + 0.5 * (p.high - p.low)
-
-
-def test_the_stiffness_of_a_rigid_machine_and_the_slip_of_an_evolution_that_is_not_there_cannot_be_told():
-    rigid = {**STEP, "stiffness_per_m": 2e4, "duration_s": 90.0, "noise": 1e-3}
-    time, mu = velocity_step(np.random.default_rng(2), **rigid)
-    assert not fit_steps(time, mu, DRIVE, "dieterich")["stiffness_per_m"].told
-    time, mu = velocity_step(np.random.default_rng(2), **{**STEP, "b": 0.0, "noise": 1e-3})
-    assert not fit_steps(time, mu, DRIVE, "dieterich", 2e3)["Dc_m"].told
 
 
 def test_whitened_noise_has_no_memory():

@@ -23,6 +23,7 @@ _ROUNDS = 3  # of fit, noise, fit
 _AFTER, _BEFORE = 30.0, 15.0  # characteristic slips that are kept of a record after the last and before the first step
 _FEWEST = 40  # samples of a stretch
 _FROM_DIRECT = (0.05, 0.2, 0.8)  # starts: characteristic slip as a share of the slip after the step, in steps of four
+_STIFFEST = 5.0  # logarithm of the largest stiffness over its start: far beyond, a machine is rigid and steps tiny
 _UNTOLD_SD = math.log(10.0) / (2 * 1.96)  # of a logarithm: the 95 % interval is a factor of ten wide
 
 
@@ -170,7 +171,7 @@ def _least(
     low = np.array([-np.inf, -np.inf, 1e-6, -np.inf, start[4] - 8.0, -np.inf])[: start.size]
     high = np.array([np.inf, np.inf, np.inf, np.inf, start[4] + 8.0, np.inf])[: start.size]
     if start.size > 5:
-        low[5], high[5] = start[5] - 12.0, start[5] + 12.0
+        low[5], high[5] = start[5] - _STIFFEST, start[5] + _STIFFEST
     return least_squares(residuals, start, x_scale=scale, bounds=(low, high), max_nfev=60, diff_step=1e-5)
 
 
