@@ -16,8 +16,7 @@ from tribo.drafting.draft import exports_in
 from tribo.errors import CampaignError
 from tribo.files import bytes_of, found_below, found_in, text_of, write_new
 from tribo.input_files import unpack
-from tribo.report.provenance import input_names
-from tribo.report.verify import _output_hashes
+from tribo.report.provenance import _output_hashes, input_names
 from tribo.site.history import answers_of
 from tribo.site.scan import contents
 

@@ -13,8 +13,7 @@ from tribo.campaign import load_campaign, open_campaign
 from tribo.errors import CampaignError, TriboError
 from tribo.files import LEADS_OUT, leads_out
 from tribo.ingestion.overrides import apply_overrides
-from tribo.report.provenance import file_hash, input_names
-from tribo.report.verify import verify
+from tribo.report.provenance import file_hash, input_names, verify
 from tribo.site.scan import scan
 
 SECRET = "secret-name,secret content\n"

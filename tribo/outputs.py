@@ -1,7 +1,7 @@
 """Every file that tribo writes into a folder of results: stated once, here, and written through :func:`write` alone.
 
 The tables of a study, campaign.nc, the protection of a user's own files (:mod:`tribo.cache.own_folder`),
-:mod:`tribo.report.verify` and the page docs/reference/files.md read this registry.
+:mod:`tribo.report.provenance` and the page docs/reference/files.md read this registry.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 from .contact_laws import SLIDER_LAWS as SLIDER_LAWS, SliderLaw as SliderLaw
-from .drives import (
+from .motion import (
     Drive as Drive,
     constant_speed as constant_speed,
     recorded_displacement as recorded_displacement,
@@ -7,10 +7,10 @@ from .drives import (
     slide_hold_slide as slide_hold_slide,
     speed_steps as speed_steps,
 )
-from .slider_files import read_slider_law as read_slider_law, write_slider_run as write_slider_run
-from .slider_run import SliderConfig as SliderConfig, SliderRun as SliderRun, simulate_slider as simulate_slider
-from .stability import (
+from .oscillator import (
     critical_speed_m_s as critical_speed_m_s,
     critical_stiffness_N_per_m as critical_stiffness_N_per_m,
     steady_sliding_speed_m_s as steady_sliding_speed_m_s,
 )
+from .slider_files import read_slider_law as read_slider_law, write_slider_run as write_slider_run
+from .slider_run import SliderConfig as SliderConfig, SliderRun as SliderRun, simulate_slider as simulate_slider

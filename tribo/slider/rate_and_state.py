@@ -14,8 +14,7 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.slider.contact_laws import StateContact, steady_friction
-from tribo.slider.drives import Drive
-from tribo.slider.motion import Machine
+from tribo.slider.motion import Drive, Machine
 from tribo.springblock.engines.jit import compiled
 
 TOLERANCE = 1e-11  # relative and absolute, of friction coefficient and logarithms

@@ -14,8 +14,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.input_files import LARGEST_NUMBER, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import FloatArray
 from tribo.slider.contact_laws import SLIDER_LAWS, Contact, SlipContact, StateContact
-from tribo.slider.drives import Drive, constant_speed
-from tribo.slider.motion import Machine, path_of, slide_exactly, slide_integrated
+from tribo.slider.motion import Drive, Machine, constant_speed, path_of, slide_exactly, slide_integrated
 from tribo.user_text import did_you_mean
 
 WINDOW_FROM_PEAKS = 1.05  # as for blocks: sliding friction is a mean from 1.05 times the time of the peak on
