@@ -1,4 +1,4 @@
-"""A driven damped oscillator in closed form, the first root of a function, and where steady sliding becomes stick-slip."""
+"""A driven damped oscillator in closed form, the first root of a function, and where sliding becomes stick-slip."""
 
 from __future__ import annotations
 

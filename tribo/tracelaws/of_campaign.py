@@ -11,7 +11,7 @@ import numpy as np
 
 from tribo.errors import TriboError
 from tribo.records import Ingested, Phase, Pull, Test, Trace, TraceLaw
-from tribo.slider.drives import Drive, speed_steps
+from tribo.slider.motion import Drive, speed_steps
 from tribo.tracelaws import slip_fits, step_fits
 from tribo.traces.phases import phases_of
 

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from tribo.records import FloatArray, TraceLaw, TraceLawParameter
-from tribo.slider.drives import Drive
+from tribo.slider.motion import Drive
 from tribo.slider.rate_and_state import WEIGHTS, integrated
 
 Filter = Callable[[FloatArray], FloatArray]
