@@ -442,7 +442,8 @@ def all_doubts(ingested: Ingested, fits: Sequence[LawFit]) -> tuple[Doubt, ...]:
 
     ratio = bound_of("friction_ratio", ingested.campaign)
     causes = tuple(mixed_units(ingested.campaign))
-    siblings = sibling_doubts(ingested, plausible=(ratio.low, ratio.high))
+    loads_in_two_units = any(doubt.quantity in ("mass_g", "normal_load_N") for doubt in causes)
+    siblings = () if loads_in_two_units else sibling_doubts(ingested, plausible=(ratio.low, ratio.high))
     others = (d for d in doubts_of(ingested.campaign, ingested, fits) if d not in causes)
     return (*causes, *siblings, *others)
 

@@ -59,7 +59,7 @@ def test_a_recorder_that_wraps_around_is_named_with_what_is_missing(seed: int, s
 
 
 def test_dropouts_and_impulses_are_no_wrap() -> None:
-    for at in ([300], [300, 301, 302], [170], [200, 420], list(range(300, 308))):
+    for at in ([174], [175], [174, 175, 176], [300], [300, 301, 302], [170], [200, 420], list(range(300, 308))):
         for value in (0.0, -2.0, 9.0):
             force = record(4).force_N.copy()
             force[at] = value

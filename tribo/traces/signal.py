@@ -442,6 +442,8 @@ def wrapped(force: FloatArray) -> tuple[int, int, float, float] | None:
     beyond = np.zeros(force.size, bool)
     for first, last in zip(down, up, strict=True):
         beyond[first + 1 : last + 1] = True
+    if np.count_nonzero(beyond) <= max(SPIKE_WIDTHS):  # an impulse, which is left out
+        return None
     small = np.abs(steps[~np.isin(np.arange(steps.size), large)])
     usual = max(float(small.max()), 4.0 * noise)  # between two samples
     top = float(force[~beyond].max())
