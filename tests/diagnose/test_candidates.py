@@ -323,7 +323,7 @@ def steps(s: Setup) -> np.ndarray:
 
 def half_and_half(s: Setup) -> np.ndarray:
     """A little of the temperature and a little tilt of the specimens: either alone leaves no misfit beyond chance."""
-    return acting("temperature", 0.026)(s) + acting("tilt", 0.012)(s)
+    return acting("temperature", 0.0245)(s) + acting("tilt", 0.0117)(s)
 
 
 def suction_that_varies(s: Setup) -> np.ndarray:

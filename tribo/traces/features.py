@@ -252,7 +252,7 @@ def _decay_fit(
     after: FloatArray, fall: FloatArray, length_s: float, tau: float
 ) -> tuple[float, float, float, float, float] | None:
     """Length of an exponential decay (s), its force at the start and the level, the first two with uncertainties."""
-    from scipy.optimize import curve_fit
+    from scipy.optimize import least_squares
 
     def decay(t: FloatArray, length: float, start: float, level: float) -> FloatArray:
         return np.asarray(level + (start - level) * np.exp(-t / abs(length)))
@@ -261,9 +261,12 @@ def _decay_fit(
         return None
     guess = length_s, float(fall[0]), float(np.median(fall[-max(fall.size // 4, 1) :]))
     try:
-        best, _ = curve_fit(decay, after, fall, guess, maxfev=200)
-    except (RuntimeError, ValueError):
+        solved = least_squares(lambda values: decay(after, *values) - fall, guess, method="lm", max_nfev=200)
+    except ValueError:
         return None
+    if not solved.success:
+        return None
+    best = solved.x
     away, left = fall - decay(after, *best), np.exp(-after / abs(best[0]))
     slopes = np.column_stack([(best[1] - best[2]) * left * after / best[0] ** 2, left, 1.0 - left])
     inverse = np.linalg.pinv(slopes.T @ slopes)  # noise differs along the decay: the covariance of White (1980)
