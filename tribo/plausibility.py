@@ -124,7 +124,7 @@ MOST_NAMED = 2
 
 
 @dataclass(frozen=True)
-class Slip:
+class LikelySlip:
     """A wrong unit: its question, and the factors by which loads, their differences, forces, masses and area change.
 
     A load N becomes ``difference`` (N - ``offset_N``): the mass of the slider may be right where the others are wrong.
@@ -172,7 +172,7 @@ def _all_inside(campaign: Campaign, numbers: Numbers) -> bool:
     return all(bounds[q].low <= value <= bounds[q].high for q, by in numbers.items() for value in by.values())
 
 
-def _candidates(campaign: Campaign) -> Iterator[Slip]:
+def _candidates(campaign: Campaign) -> Iterator[LikelySlip]:
     """Slips in the order of how often they are made: a load typed by hand, the area, then the unit of an export."""
     stated = {test.load_from for test in campaign.tests}
     for column, ways in _LOADS.items():
@@ -183,23 +183,23 @@ def _candidates(campaign: Campaign) -> Iterator[Slip]:
         slider = campaign.slider_mass_kg * STANDARD_GRAVITY
         loads = _loads(campaign)
         question = "slider_mass_g in campaign.toml looks like kilograms: multiply by 1000"
-        yield Slip(question, load=float(np.median((loads + 999 * slider) / loads)))
+        yield LikelySlip(question, load=float(np.median((loads + 999 * slider) / loads)))
     if campaign.has_area:
         for words, factor in _AREAS:
-            yield Slip(f"nominal_area_mm2 looks like {words}", area=factor)
+            yield LikelySlip(f"nominal_area_mm2 looks like {words}", area=factor)
     if any(test.evaluated is None for test in campaign.tests):
         for words, factor in _FORCES:
-            yield Slip(f"the friction force of the exports looks like {words}", force=factor)
+            yield LikelySlip(f"the friction force of the exports looks like {words}", force=factor)
 
 
-def _of_loads(campaign: Campaign, question: str, change: Callable[[np.ndarray, float], np.ndarray]) -> Slip:
+def _of_loads(campaign: Campaign, question: str, change: Callable[[np.ndarray, float], np.ndarray]) -> LikelySlip:
     loads = _loads(campaign)
     slider = campaign.slider_mass_kg * STANDARD_GRAVITY
     other = change(loads, slider)
     usual = float(np.median(other / loads))
     span = float(np.ptp(loads))
     steeper = float(np.ptp(other)) / span if span > 0 else usual
-    return Slip(question, usual, steeper, float(np.median(loads - other / steeper)), mass=steeper)
+    return LikelySlip(question, usual, steeper, float(np.median(loads - other / steeper)), mass=steeper)
 
 
 def _loads(campaign: Campaign) -> np.ndarray:

@@ -19,7 +19,7 @@ from tribo.slider import (
     speed_steps,
     steady_sliding_speed_m_s,
 )
-from tribo.slider.motion import Machine
+from tribo.slider.motion import SliderMachine
 from tribo.slider.rate_and_state import friction_path
 
 OTHER_CODE = Path(__file__).resolve().parents[3] / "shared" / "real" / "rate-and-state-other-code" / "cjm_model.tim"
@@ -39,7 +39,7 @@ def test_a_velocity_step_is_that_of_the_c_code_of_marone_to_the_digits_that_it_p
     times, printed = np.maximum(table[:, 0], 0.0), table[:, 1]
     unique, back = np.unique(times, return_inverse=True)
     drive = speed_steps([0.0, 1e-13], [1e-6, 1e-5])
-    mu, *_ = friction_path(Machine(0.0, 1e3, 0.0, 0.0), STEP.contact(), drive, unique)  # type: ignore[arg-type]
+    mu, *_ = friction_path(SliderMachine(0.0, 1e3, 0.0, 0.0), STEP.contact(), drive, unique)  # type: ignore[arg-type]
     assert np.abs(mu[back] - printed).max() < 1e-6 * np.ptp(printed)
 
 

@@ -20,7 +20,7 @@ from tribo.display import displayed
 from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.slider.contact_laws import SlipContact, SpeedContact
-from tribo.slider.oscillator import EXACT, Oscillation, first_crossing, first_fall
+from tribo.slider.oscillator import EXACT, DampedOscillation, first_crossing, first_fall
 
 
 @displayed(lambda drive: drive.label)
@@ -146,7 +146,7 @@ _STEPS_PER_SWING = 20
 
 
 @dataclass(frozen=True)
-class Machine:
+class SliderMachine:
     """Between drive and slider: a spring with a gap, and a damper beside it; and the mass that it pulls."""
 
     mass_kg: float
@@ -190,13 +190,13 @@ class Path:
 Resting = SlipContact | SpeedContact
 """Contacts that can be at rest."""
 Fill = Callable[[FloatArray], tuple[Any, Any]]
-Slide = Callable[[Machine, Any, Drive, float, float, Moving], tuple[float, str, Moving, Fill]]
+Slide = Callable[[SliderMachine, Any, Drive, float, float, Moving], tuple[float, str, Moving, Fill]]
 """From a time, at most to another, on one piece of the drive: when something happens, what, the slider then, and its
 position and speed at times between."""
 
 
 def path_of(
-    machine: Machine, contact: Resting, drive: Drive, times_s: FloatArray, sliding: bool, slide: Slide
+    machine: SliderMachine, contact: Resting, drive: Drive, times_s: FloatArray, sliding: bool, slide: Slide
 ) -> Path:
     """The motion from the start to the last of ``times_s``; from rest, or from steady sliding with the drive."""
     end = float(times_s[-1])
@@ -242,7 +242,7 @@ def path_of(
     return Path(position, velocity, stuck, tuple(starts), tuple(stops))
 
 
-def _pull(machine: Machine, drive: Drive, t: float, x: float, piece: int | None = None) -> float:
+def _pull(machine: SliderMachine, drive: Drive, t: float, x: float, piece: int | None = None) -> float:
     """Force of the machine on a slider at rest."""
     speed = drive.speed_m_s(t) if piece is None else _local(drive, piece, t)[1]
     return float(machine.spring_N(drive.position_m(t) - x) + machine.damping_N_s_per_m * speed)
@@ -258,7 +258,7 @@ def _local(drive: Drive, piece: int, t: float) -> tuple[float, float]:
     )
 
 
-def _side(machine: Machine, stretch_m: float, rate_m_s: float) -> int:
+def _side(machine: SliderMachine, stretch_m: float, rate_m_s: float) -> int:
     """Where the spring is; at an edge of the gap, where it goes."""
     half = 0.5 * machine.backlash_m
     if half == 0.0:
@@ -268,13 +268,13 @@ def _side(machine: Machine, stretch_m: float, rate_m_s: float) -> int:
     return int(np.sign(stretch_m)) if abs(stretch_m) > half else 0
 
 
-def _released(machine: Machine, contact: Resting, drive: Drive, t: float, x: float) -> Moving:
+def _released(machine: SliderMachine, contact: Resting, drive: Drive, t: float, x: float) -> Moving:
     pull = _pull(machine, drive, t, x) or float(drive.speed_m_s(t))  # without friction it follows the drive at once
     direction = 1 if pull > 0.0 else -1
     return Moving(x, 0.0, direction, x, 0, _side(machine, float(drive.position_m(t)) - x, float(drive.speed_m_s(t))))
 
 
-def _steady(machine: Machine, contact: Resting, drive: Drive) -> Moving | None:
+def _steady(machine: SliderMachine, contact: Resting, drive: Drive) -> Moving | None:
     """Steady sliding with the drive, friction at its last value; from rest where the drive stands."""
     speed = float(drive.speed_m_s(0.0))
     if speed == 0.0:
@@ -288,7 +288,7 @@ def _steady(machine: Machine, contact: Resting, drive: Drive) -> Moving | None:
 
 
 def _start_of_slip(
-    machine: Machine, contact: Resting, drive: Drive, t: float, until: float, x: float, stuck_s: float
+    machine: SliderMachine, contact: Resting, drive: Drive, t: float, until: float, x: float, stuck_s: float
 ) -> float:
     """When the pull on a stuck slider first exceeds its threshold; infinity where it does not before ``until``.
 
@@ -335,7 +335,7 @@ def _places(drive: Drive, k: int, t: float, after: Any) -> tuple[Any, Any]:
 
 
 def slide_exactly(
-    machine: Machine, contact: SlipContact, drive: Drive, t: float, until: float, moving: Moving
+    machine: SliderMachine, contact: SlipContact, drive: Drive, t: float, until: float, moving: Moving
 ) -> tuple[float, str, Moving, Fill]:
     """One piece of sliding in closed form: a damped oscillator under the force of the drive."""
     k = int(drive.piece(t))
@@ -350,7 +350,7 @@ def slide_exactly(
     # in the frame of the slider's own start: no digits are lost to a long travel
     held = stiffness * (base - moving.x_m - 0.5 * moving.side * machine.backlash_m) + c * speed
     friction = d * (sliding[j] + slope * (d * (moving.x_m - moving.origin_m) - slips[j]))
-    motion = Oscillation(
+    motion = DampedOscillation(
         machine.mass_kg, c + contact.viscous_N_s_per_m, stiffness + slope,
         stiffness + abs(slope), held - friction, stiffness * speed,
         drive.amplitude_m * math.hypot(stiffness, c * omega), omega,
@@ -393,7 +393,7 @@ def _straight(drive: Drive, k: int, t: float) -> tuple[float, float]:
 
 
 def _leaving(
-    machine: Machine, drive: Drive, k: int, t: float, moving: Moving, motion: Oscillation, grid: FloatArray
+    machine: SliderMachine, drive: Drive, k: int, t: float, moving: Moving, motion: DampedOscillation, grid: FloatArray
 ) -> dict[str, float]:
     """When the stretch of the spring next passes an edge of the gap, by the side it passes to."""
     half = 0.5 * machine.backlash_m
@@ -414,7 +414,7 @@ def _leaving(
 
 
 def slide_integrated(
-    machine: Machine, contact: Resting, drive: Drive, t: float, until: float, moving: Moving
+    machine: SliderMachine, contact: Resting, drive: Drive, t: float, until: float, moving: Moving
 ) -> tuple[float, str, Moving, Fill]:
     """One piece of sliding by scipy's DOP853 with events, to relative 1e-11."""
     from scipy.integrate import solve_ivp

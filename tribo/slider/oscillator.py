@@ -24,7 +24,7 @@ EXACT: dict[str, Any] = {"xtol": 1e-300, "rtol": 4 * np.finfo(float).eps, "maxit
 
 
 @dataclass(frozen=True)
-class Oscillation:
+class DampedOscillation:
     """m x'' + c x' + K x = p0 + p1 t + P sin(w t + q) from x0 and v0 at t = 0; K may be negative or zero.
 
     Parameters

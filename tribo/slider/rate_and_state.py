@@ -14,7 +14,7 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.slider.contact_laws import StateContact, steady_friction
-from tribo.slider.motion import Drive, Machine
+from tribo.slider.motion import Drive, SliderMachine
 from tribo.springblock.engines.jit import compiled
 
 TOLERANCE = 1e-11  # relative and absolute, of friction coefficient and logarithms
@@ -23,7 +23,7 @@ _MOST_LOST = 60  # steps refused in a row after which the motion counts as impos
 
 
 def friction_path(
-    machine: Machine, contact: StateContact, drive: Drive, times_s: FloatArray, by_scipy: bool = False
+    machine: SliderMachine, contact: StateContact, drive: Drive, times_s: FloatArray, by_scipy: bool = False
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Friction coefficient, speed and position of the slider, shape (n,), and states theta in s, shape (states, n).
 
@@ -158,7 +158,7 @@ def _rates(contact: StateContact) -> tuple[Any, Any, Any]:
 
 
 def _by_scipy(
-    machine: Machine, contact: StateContact, drive: Drive, times_s: FloatArray, start: FloatArray
+    machine: SliderMachine, contact: StateContact, drive: Drive, times_s: FloatArray, start: FloatArray
 ) -> FloatArray:
     """The readable twin of :func:`integrated`, without inertia, piece by piece of the drive."""
     states, b, _ = _rates(contact)
@@ -173,7 +173,7 @@ def _by_scipy(
 
 
 def _with_inertia(
-    machine: Machine, contact: StateContact, drive: Drive, times_s: FloatArray, start: FloatArray
+    machine: SliderMachine, contact: StateContact, drive: Drive, times_s: FloatArray, start: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """m v' = k (X - x) + c (V - v) - N mu, in the variables stretch X - x, q and phi; stiff wherever v is small."""
     states, b, Dc = _rates(contact)

@@ -14,7 +14,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.input_files import LARGEST_NUMBER, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import FloatArray
 from tribo.slider.contact_laws import SLIDER_LAWS, Contact, SlipContact, StateContact
-from tribo.slider.motion import Drive, Machine, constant_speed, path_of, slide_exactly, slide_integrated
+from tribo.slider.motion import Drive, SliderMachine, constant_speed, path_of, slide_exactly, slide_integrated
 from tribo.user_text import did_you_mean
 
 WINDOW_FROM_PEAKS = 1.05  # as for blocks: sliding friction is a mean from 1.05 times the time of the peak on
@@ -245,7 +245,7 @@ def simulate_slider(config: SliderConfig) -> SliderRun:
     """
     config.check()
     contact, drive = config.contact(), config.drive
-    machine = Machine(config.mass_kg, config.stiffness_N_per_m, config.damping_N_s_per_m, config.backlash_m)
+    machine = SliderMachine(config.mass_kg, config.stiffness_N_per_m, config.damping_N_s_per_m, config.backlash_m)
     time = np.arange(int(config.duration_s * config.rate_Hz * (1 + 1e-12)) + 1) / config.rate_Hz
     place, pace = drive.position_m(time), drive.speed_m_s(time)
     states, starts, stops = np.zeros((0, time.size)), np.zeros(0), np.zeros(0)
@@ -273,7 +273,7 @@ def simulate_slider(config: SliderConfig) -> SliderRun:
 
 
 def _static(
-    machine: Machine, config: SliderConfig, time: FloatArray, force: FloatArray, starts: FloatArray
+    machine: SliderMachine, config: SliderConfig, time: FloatArray, force: FloatArray, starts: FloatArray
 ) -> tuple[float, float]:
     """The highest force before the second slip and when it is reached: exact where it is the start of the first one."""
     until = starts[1] if starts.size > 1 else time[-1]

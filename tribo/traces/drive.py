@@ -52,7 +52,7 @@ _SHORTEST = 0.02  # share of a motion that a level lasts at the least
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveMotion:
     """The motion of the drive: ``pace`` (n,) in the unit of its ``channel`` per second, signed where that tells.
 
     ``moving`` (n,) says where it moves; ``turns`` are the samples at which it changes its direction. The pace is a mean
@@ -66,7 +66,7 @@ class Drive:
     width: int = 1
 
 
-def drive_of(trace: Trace) -> Drive | None:
+def drive_of(trace: Trace) -> DriveMotion | None:
     """The motion of the drive by a recorded speed or rotation, else by a displacement that moves; None without one."""
     for quantity, channel in (("speed_m_s", "speed"), ("rotation_rev_per_s", "rotation speed")):
         speed = trace.columns.get(quantity)
@@ -78,7 +78,7 @@ def drive_of(trace: Trace) -> Drive | None:
     return _one_way(trace.time_s, x) or _to_and_fro(trace.time_s, x)
 
 
-def _by_speed(speed: FloatArray, channel: str) -> Drive:
+def _by_speed(speed: FloatArray, channel: str) -> DriveMotion:
     calm = median_of_three(speed)
     top = float(np.percentile(np.abs(calm), 95)) or float(np.abs(speed).max())
     blocks = np.array_split(speed, min(20, max(speed.size // MINIMUM_SAMPLES, 1)))
@@ -104,7 +104,7 @@ def _by_speed(speed: FloatArray, channel: str) -> Drive:
     decided = np.flatnonzero(side)
     turned = np.flatnonzero(np.diff(side[decided]))
     turns = tuple(int(decided[k] + decided[k + 1] + 1) // 2 for k in turned)
-    return Drive(pace, moving, channel, turns, width)
+    return DriveMotion(pace, moving, channel, turns, width)
 
 
 def at_rest_below(speed: FloatArray) -> float:
@@ -140,7 +140,7 @@ def _narrowed(mask: Mask, by: int) -> Mask:
     return found
 
 
-def _one_way(time_s: FloatArray, x: FloatArray) -> Drive | None:
+def _one_way(time_s: FloatArray, x: FloatArray) -> DriveMotion | None:
     """The drive by a displacement that goes one way."""
     width = max(FEWEST_AT_REST, x.size // 500)
     smooth = running_mean(x, width)
@@ -149,7 +149,7 @@ def _one_way(time_s: FloatArray, x: FloatArray) -> Drive | None:
         return None
     pace = _pace(time_s, smooth, width)
     moving = np.abs(pace) > _AT_REST * float(np.percentile(np.abs(pace), 75))
-    return Drive(
+    return DriveMotion(
         pace, _narrowed(moving, width - 1), "displacement", (), 2 * width
     )  # motion is felt so many samples around it
 
@@ -160,7 +160,7 @@ def _pace(time_s: FloatArray, x: FloatArray, width: int) -> FloatArray:
     return np.asarray((x[ahead] - x[behind]) / np.maximum(time_s[ahead] - time_s[behind], 1e-300))
 
 
-def _to_and_fro(time_s: FloatArray, x: FloatArray) -> Drive | None:
+def _to_and_fro(time_s: FloatArray, x: FloatArray) -> DriveMotion | None:
     """The drive by a displacement that goes to and fro, with its turns."""
     noise, span = sample_noise(x), float(np.ptp(x))
     if span <= _MOVES * noise or span <= 0:
@@ -185,7 +185,7 @@ def _to_and_fro(time_s: FloatArray, x: FloatArray) -> Drive | None:
         before, after = np.flatnonzero(moving[:end]), np.flatnonzero(moving[end:])
         if before.size and after.size:
             turns.append((int(before[-1]) + 1 + end + int(after[0])) // 2)
-    return Drive(pace, side != 0, "position", tuple(turns), 2 * width)
+    return DriveMotion(pace, side != 0, "position", tuple(turns), 2 * width)
 
 
 def speed_level_m_s(trace: Trace) -> float:

@@ -19,7 +19,7 @@ from tribo.records import FloatArray, Phase, Trace
 from tribo.traces.cuts import reversals
 from tribo.traces.drive import (
     FEWEST_AT_REST,
-    Drive,
+    DriveMotion,
     Range,
     drive_of,
     drive_stops,
@@ -532,7 +532,7 @@ def _start_from_rest(
     return first + int(np.searchsorted(time[part], loading.onset_s)), first + loading.top
 
 
-def _strokes(signal: Signal, drive: Drive | None, span: Range) -> list[_Span]:
+def _strokes(signal: Signal, drive: DriveMotion | None, span: Range) -> list[_Span]:
     """The strokes of a motion to and fro, by the turns of the drive, else by the reversals of the force."""
     begin, end = span
     if end - begin < MINIMUM_SAMPLES:
@@ -578,7 +578,7 @@ def _between_strokes(found: Sequence[_Span], first: int, stroke: int, teller: st
 def _motion(
     trace: Trace,
     signal: Signal,
-    drive: Drive | None,
+    drive: DriveMotion | None,
     span: Range,
     number: int,
     from_rest: bool,
@@ -658,7 +658,7 @@ def _gaps(time_s: FloatArray) -> NDArray[np.int64]:
     return np.flatnonzero(step_s > _GAP * float(np.median(step_s))) + 1
 
 
-def _phase(trace: Trace, signal: Signal, drive: Drive | None, gaps: NDArray[np.int64], span: _Span) -> Phase:
+def _phase(trace: Trace, signal: Signal, drive: DriveMotion | None, gaps: NDArray[np.int64], span: _Span) -> Phase:
     """A phase with the means of its channels and what is doubtful about it."""
     part = slice(span.first, span.last)
     time, force = signal.time_s, signal.force_N[part]
