@@ -81,8 +81,8 @@ class StudyOptions:
         Folder of finished simulations and diagnosis, used again by the next start.
     scheduler : str, optional
         Address of a dask scheduler that runs the simulations.
-    trace_law : str
-        Law to read from whole traces, "auto" or a name in ``tribo.tracelaws``; empty: none.
+    trace_law : str, optional
+        Law to read from whole traces, "auto" or a name in ``tribo.tracelaws``.
 
     Examples
     --------
@@ -105,7 +105,7 @@ class StudyOptions:
     overrides: Path | None = None
     kept: Path | None = None
     scheduler: str | None = None
-    trace_law: str = ""
+    trace_law: str | None = None
 
     @property
     def model_runs(self) -> ModelRuns:

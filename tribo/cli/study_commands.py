@@ -71,7 +71,7 @@ def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 @OUT
 @DRY_RUN
 @click.option(
-    "--trace-law", type=click.Choice(["auto", "coulomb", "ageing", "dieterich", "ruina"]), default="",
+    "--trace-law", type=click.Choice(["auto", "coulomb", "ageing", "dieterich", "ruina"]),
     help="Read a law and the machine from whole records with stick-slip (coulomb, ageing) or steps of speed "
     "(dieterich, ruina), with intervals; auto: the law that fits. Writes tracelaws.csv.",
 )

@@ -193,7 +193,7 @@ class SliderRun:
     >>> import tribo
     >>> run = tribo.simulate_slider(tribo.SliderConfig(values={"mu_s": 0.4, "mu_d": 0.3}, duration_s=20.0))
     >>> run.starts_s.size, bool(run.stuck[0])
-    (5, True)
+    (4, True)
     """
 
     config: SliderConfig
@@ -241,7 +241,7 @@ def simulate_slider(config: SliderConfig) -> SliderRun:
     >>> config = tribo.SliderConfig(values={"mu_s": 0.36, "mu_d": 0.30}, duration_s=30.0)
     >>> run = tribo.simulate_slider(config)
     >>> print(f"{run.starts_s.size} slips, {100 * run.stuck.mean():.0f} % of the time stuck")
-    13 slips, 97 % of the time stuck
+    11 slips, 98 % of the time stuck
     """
     config.check()
     contact, drive = config.contact(), config.drive
