@@ -381,7 +381,6 @@ _CHOICES: dict[str, tuple[str | None, ...]] = {
 _OF_THE_STEP = {
     "dt_s", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "damping_per_s", "shear_factor",
     "contact_stiffness_Pa_per_m", "machine_stiffness_N_per_m", "slider_mass_kg", "machine_damping_N_s_per_m",
-    "pressure_Pa", "blocks",
 }  # fmt: skip
 _OF_THE_GEOMETRY = {"spacing_m", "edges", "cavity_shape"}
 _OF_THE_WINDOW = {"window_start_peaks", "window_end_peaks"}
@@ -410,7 +409,8 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
             "no_edge", "periodic edges leave no edge to pull", column="pulled_edge", found=config.pulled_edge,
             allowed="edges free",
         )  # fmt: skip
-    if not faulty & _OF_THE_STEP and config.dt_s > config.largest_dt_s:
+    of_the_step = _OF_THE_STEP if config.machine_stiffness_N_per_m is None else _OF_THE_STEP | {"pressure_Pa", "blocks"}
+    if not faulty & of_the_step and config.dt_s > config.largest_dt_s:
         yield Problem(
             "unstable_step", "the time step exceeds the stability limit", column="dt_s",
             found=f"{config.dt_s:g}", allowed=f"at most {config.largest_dt_s:.3g} s for these springs and masses",

@@ -233,6 +233,7 @@ def forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t: float
 @inner
 def carried(a: float, b: float, w_x: float, w_y: float, dt: float, machine: FloatArray | None) -> float:
     """What the quasi-static motion adds to the square of m v / dt; left out where the slider is never fast."""
+    copied_into_callers()
     if machine is None:
         return 0.0
     pace = pace_after(dt, machine)
@@ -242,6 +243,7 @@ def carried(a: float, b: float, w_x: float, w_y: float, dt: float, machine: Floa
 @inner
 def frame_of(frame: FloatArray, i: Any, machine: FloatArray | None) -> float:
     """m w / dt of a block, where it is kept."""
+    copied_into_callers()
     if machine is None:
         return 0.0
     return frame[i]
