@@ -7,6 +7,8 @@ import io
 import os
 import pickle
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -70,7 +72,6 @@ class RememberedPages(Remembered):
         import typst
 
         super().__init__(file)
-        self.real = typst.Compiler
         typst.Compiler = lambda root, **options: _Page(self, Path(root), options)  # type: ignore[misc, assignment]
 
 
@@ -85,29 +86,21 @@ class _Page:
                 key.update(name.encode() + b"\0" + file.read())
 
         def make() -> bytes:
-            compiler: Any = self.pages.real(root=self.root, **self.options)
-            return bytes(compiler.compile(source, **options))
+            asked = pickle.dumps((self.root, self.options, source, options))
+            return subprocess.run(
+                [sys.executable, "-c", _SETTING], input=asked, stdout=subprocess.PIPE, check=True
+            ).stdout
 
-        return self.pages.made(key.hexdigest(), lambda: _in_own_process(make))
+        return self.pages.made(key.hexdigest(), make)
 
 
-def _in_own_process(make: Callable[[], bytes]) -> bytes:
-    """What ``make`` gives in a fork of this process: typst starts threads, which the forks of a process do not have."""
-    answer = os.pipe()
-    child = os.fork()
-    if not child:
-        try:
-            with real_open(answer[1], "wb") as stream:
-                stream.write(make())
-            os._exit(0)
-        finally:
-            os._exit(1)
-    os.close(answer[1])
-    with real_open(answer[0], "rb") as stream:
-        content: bytes = stream.read()
-    _, ended = os.waitpid(child, 0)
-    assert ended == 0, "typst failed"
-    return content
+# In a process of its own: typst starts threads. A fork of this process does not have those that it started before, and
+# would wait for them for ever.
+_SETTING = """
+import pickle, sys, typst
+root, how, source, options = pickle.load(sys.stdin.buffer)
+sys.stdout.buffer.write(typst.Compiler(root=root, **how).compile(source, **options))
+"""
 
 
 class RememberedFigures(Remembered):
