@@ -148,15 +148,20 @@ def test_text_is_laid_out_as_wide_as_it_is_drawn() -> None:
     assert laid_out == pytest.approx(drawn, rel=0.02)
 
 
-def test_the_laws_of_samples_that_rub_alike_are_told_apart() -> None:
+@pytest.mark.parametrize(
+    ("laws", "labels"), [(["T = 0.50 N", "T = 0.51 N", "T = 0.52 N", "T = 0.53 N"], 4), (["T = μ N"] * 4, 1)]
+)
+def test_the_laws_of_samples_that_rub_alike_are_told_apart_and_one_law_of_all_is_named_once(
+    laws: list[str], labels: int
+) -> None:
     loads = np.linspace(1.0, 2.0, 5)
     frames = [
         pd.DataFrame({"sample_number": k, "sample": f"S{k}", "regime": "sliding", "mark": mark, "normal_load_N": loads,
                       "T_N": 0.5 * loads})
-        for k in range(4) for mark in ("measured", "T = μ N")
+        for k, law in enumerate(laws) for mark in ("measured", law)
     ]  # fmt: skip
     figure = measured_friction.draw_forces(pd.concat(frames, ignore_index=True))
-    assert len(figure.axes[0].texts) == 4
+    assert len(figure.axes[0].texts) == labels
     assert collisions(figure) == []
 
 
