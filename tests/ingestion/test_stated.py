@@ -95,7 +95,7 @@ def test_a_sampling_rate_and_a_speed_make_the_time(tmp_path: Path) -> None:
     tests = (
         "test_id,file,sample,normal_load_N,speed_mm_s,sampling_rate_Hz\nT1,raw/a.txt,F,10,,50\nT2,raw/b.txt,F,10,0.5,\n"
     )
-    path = export("Displacement [mm]\tForce [N]", 0.5 * time, force)
+    path = export("Displacement [mm]\tForce [N]", 0.5 * time, 1.01 * force)
     folder = campaign(
         tmp_path / "c",
         tests,

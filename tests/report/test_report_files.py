@@ -19,7 +19,7 @@ from tribo.records import Study
 from tribo.report import gather_provenance, write_report, write_until
 from tribo.report.campaign_nc import write_store
 
-FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9))]
+FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9)), "traces"]
 
 
 def test_out_holds_the_agreed_files(written: Written) -> None:

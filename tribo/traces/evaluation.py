@@ -394,6 +394,11 @@ def _slid_unseen(trace: Trace, pull: Pull, test: Test | None) -> bool:
     return travel > (_STRETCH_M if between_samples else _LONGEST_STRETCH_M)
 
 
+def with_static_peak(pull: Pull, peak_s: float, static_N: float, static_u_N: float) -> Pull:
+    """A pull with another static peak than that of its rule."""
+    return replace(pull, peak_s=peak_s, static_N=static_N, static_u_N=static_u_N)
+
+
 def _without_static(pull: Pull) -> Pull:
     """A pull whose first maximum is none of a start from rest."""
     flags = [flag for flag in pull.flags if not flag.startswith("peak_") and flag not in ("rounded_peak", "no_drop")]

@@ -15,6 +15,7 @@ import numpy as np
 
 from tribo.records import Feature, FloatArray, Pull, Slip, Trace
 from tribo.traces.drive import speed_level_m_s
+from tribo.traces.evaluation import with_static_peak
 from tribo.traces.signal import (
     condense,
     line,
@@ -155,7 +156,7 @@ def _with_highest(time: FloatArray, force: FloatArray, pull: Pull) -> Pull:
     k = int(np.argmax(smooth))
     if smooth[k] - pull.static_N < max(_DROP * pull.static_N, 4.0 * sample_noise(force)):
         return pull
-    return replace(pull, static_N=float(smooth[k]), peak_s=float(time[first + k]), static_u_N=sample_noise(force))
+    return with_static_peak(pull, float(time[first + k]), float(smooth[k]), sample_noise(force))
 
 
 def _smoothed_rise(force: FloatArray, pull: Pull, time: FloatArray) -> FloatArray:
