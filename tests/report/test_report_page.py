@@ -108,7 +108,7 @@ def test_every_pull_and_every_test_set_aside_is_on_the_page(page: str, study: St
 def test_the_page_draws_its_figures_itself_where_none_are_given(measured: Study, page: str) -> None:
     drawn = html(measured).count("<figure")
     assert drawn == 8  # with T and T/N against load, and every test, of a report without the model
-    assert page.count("<figure") == 7
+    assert page.count("<figure") == 8
 
 
 def test_figures_take_the_colours_of_the_theme(page: str, outline: Outline) -> None:

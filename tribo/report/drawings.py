@@ -303,7 +303,7 @@ NARROWEST_MM, WIDEST_MM = 80.0, 400.0
 OF_TEXT = {
     "sample", "specimen", "test_id", "regime", "mark", "axis", "y_axis", "title", "detail", "x_name", "row", "label",
     "covariate", "observable", "name", "mechanism", "choice", "status", "estimate", "reason", "model", "formula",
-    "group", "parameter", "cavity", "variable", "way", "quantity",
+    "group", "parameter", "cavity", "variable", "way", "quantity", "source",
 }  # fmt: skip
 _WHOLE = re.compile(r"-?\d+")
 
