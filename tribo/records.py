@@ -840,6 +840,7 @@ CONDITIONS = (
 _PLAIN_NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d{1,2})?")  # 001 is a name
 
 
+@displayed(lambda p: f"{p.name} {p.value:.4g}")
 @dataclass(frozen=True)
 class TraceLawParameter:
     """One parameter of a law or machine that was read from a whole trace.
