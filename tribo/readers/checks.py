@@ -291,7 +291,7 @@ def _only_alike(before: FloatArray, after: FloatArray, times: float) -> bool:
     if min(before.size, after.size) < _FEWEST_ROWS:
         return False
     level, level_u, trend = _level(before)
-    if abs(trend) > 2.0 * _SURE * level_u:
+    if abs(trend) > 2.0 * _SURE * min(level_u, _typical(np.abs(np.diff(before)))):
         return False  # it was rising: no level to compare with
     other, other_u, _ = _level(after)
     if abs(other - times * level) > _SURE * math.hypot(other_u, times * level_u) + _SAME_RATIO * abs(other):
