@@ -573,8 +573,12 @@ def _repeated(force: FloatArray) -> Oddness | None:
     windows = np.lib.stride_tricks.sliding_window_view(force, _REPEATED_BLOCK)[:: 1 if force.size < 200_000 else 7]
     varied = np.flatnonzero(np.ptp(windows, axis=1) > noise)
     places: dict[bytes, int] = {}
+    kept = 1 if force.size < 20_000 else 16  # of a long record every 16th place is kept, and all are looked up
     for at in varied.tolist():
-        first = places.setdefault(windows[at].tobytes(), at)
+        block = windows[at].tobytes()
+        first = places.get(block, at)
+        if at % kept == 0:
+            places.setdefault(block, at)
         if first != at:
             what = f"{_REPEATED_BLOCK} data points or more are those of an earlier part of the record, digit by digit"
             return "repeated_samples", what, at, f"{force[at]:.6g} N, as {at - first} data points before"
