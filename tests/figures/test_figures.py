@@ -293,7 +293,7 @@ def test_numbers_name_their_units(study: Study) -> None:
     unitless = {
         "sample_number", "sample", "regime", "group", "mark", "test_id", "n_pulls", "seed", "parameter", "value",
         "value_u", "area_fraction", "ratio", "ratio_low", "ratio_high", "T_over_N", "T_over_N_u", "T_over_peak",
-        "specimen", "specimen_number", "cavity", "staggered",
+        "specimen", "specimen_number", "cavity", "staggered", "source",
     }  # fmt: skip
     for figure in FIGURES.values():
         for column in set(figure.numbers(study).columns) - unitless:
