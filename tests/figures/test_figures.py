@@ -297,7 +297,7 @@ def test_numbers_name_their_units(study: Study) -> None:
     }  # fmt: skip
     for figure in FIGURES.values():
         for column in set(figure.numbers(study).columns) - unitless:
-            unit = re.search(r"_(N_per_mm|N|s|ms|kPa|deg|um)$", column)
+            unit = re.search(r"_(N_per_mm|N|s|ms|kPa|deg|mm|um)$", column)
             assert unit, (figure.name, column)
 
 
