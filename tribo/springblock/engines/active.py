@@ -509,6 +509,7 @@ def admit_due(step: int, lists: Lists) -> None:
 @inner
 def await_failures(s: State, a: Active, c: Numerics, machine: FloatArray | None) -> None:
     """Put strips that fell asleep into the queue; where the slider moves by itself, they listen instead."""
+    copied_into_callers()
     lists = a.lists
     if lists.members[PENDING] == 0:
         return
@@ -523,6 +524,7 @@ def await_failures(s: State, a: Active, c: Numerics, machine: FloatArray | None)
 @inner
 def jump(until_step: int, s: State, a: Active, out: Samples, c: Numerics, machine: FloatArray | None) -> bool:
     """Skip the steps to the next failure in the queue where nothing moves; whether there were any."""
+    copied_into_callers()
     lists = a.lists
     if machine is not None or listed(GLIDING, lists) > 0:
         return False
@@ -557,6 +559,7 @@ def slack(a: Active, c: Numerics, t: float, machine: FloatArray) -> tuple[float,
 @inner
 def drift(until_step: int, s: State, a: Active, out: Samples, c: Numerics, machine: FloatArray | None) -> bool:
     """Where nothing moves, move the slider alone until a block might; at least by a step. Whether nothing moved."""
+    copied_into_callers()
     if machine is None or listed(GLIDING, a.lists) > 0:
         return False
     calm = machine[CARRIED] * abs(drag_rate(c.damping, machine)) < 0.5 * c.rest_force
@@ -574,6 +577,7 @@ def drift(until_step: int, s: State, a: Active, out: Samples, c: Numerics, machi
 @inner
 def moved_along(along: float, way: float, a: Active, c: Numerics, pulled: IntArray | None) -> float:
     """Displacement along the pull beyond the quasi-static one, summed over the blocks that the slider pulls."""
+    copied_into_callers()
     if pulled is None:
         return along + way * total(a.sums.along)
     found, p = 0.0, a.planes
