@@ -138,8 +138,7 @@ class Laboratory:
         from tribo import stages
         from tribo.diagnostics.conclusion import cannot_tell
         from tribo.diagnostics.diagnosis import examine
-        from tribo.fitting.alternatives import compared_laws
-        from tribo.fitting.dependence import dependence
+        from tribo.fitting.alternatives import compared_laws, dependence
         from tribo.lawsearch.diagnosis_with_laws import with_laws
         from tribo.records import Study
         from tribo.wording.verdict_sentences import worded

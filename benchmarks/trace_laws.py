@@ -26,8 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from support.virtual_slips import slips, velocity_step
 
 from tribo.slider import speed_steps
-from tribo.tracelaws import slip_fits, step_fits
-from tribo.tracelaws.of_campaign import chosen_slip_laws, chosen_step_laws
+from tribo.tracelaws import SLIP_LAWS, STEP_LAWS, chosen_slip_laws, chosen_step_laws, fit_laws, fit_slips
 
 TRUTHS = ("coulomb", "ageing", "dieterich", "ruina")
 
@@ -78,16 +77,16 @@ def examined(truth: str, number: int) -> dict:
     """One record: what was fitted under its own law beside the truth, and which laws were chosen."""
     rng = np.random.default_rng([26000 + number, TRUTHS.index(truth)])
     began = time.process_time()
-    if truth in slip_fits.LAWS:
+    if truth in SLIP_LAWS:
         (t, force), known, (load, speed) = slip_record(rng, truth)
-        made = [slip_fits.fit_slips(t, force, law, load, speed) for law in slip_fits.LAWS]
+        made = [fit_slips(t, force, law, load, speed) for law in SLIP_LAWS]
         if made[0] is None:
             return {"truth": truth, "number": number, "chosen": []}
         chosen = [law.law for law in chosen_slip_laws(made)]
     else:
         (t, mu), known, (drive, noise) = step_record(rng, truth)
         known["noise"] = noise
-        made = step_fits.fit_laws(t, mu, drive, step_fits.LAWS)
+        made = fit_laws(t, mu, drive, STEP_LAWS)
         chosen = [law.law for law in chosen_step_laws(made)]
     own = next(law for law in made if law.law == truth)
     rows = {p.name: [known[p.name], p.value, p.low, p.high, bool(p.told)] for p in own.parameters if p.name in known}

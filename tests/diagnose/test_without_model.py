@@ -19,8 +19,7 @@ from tribo.cli import main
 from tribo.diagnostics.column_search import load_levels, regime_tests
 from tribo.diagnostics.direct_evidence import running_in, stroke_offset
 from tribo.diagnostics.verdict import Cause, Verdict
-from tribo.fitting.alternatives import compared_laws
-from tribo.fitting.dependence import dependence
+from tribo.fitting.alternatives import compared_laws, dependence
 from tribo.plausibility import doubts_of
 from tribo.records import Campaign, Ingested, Pattern, Pull, Study, Test, Trace
 from tribo.wording.part_sentences import cause_sentence, layer_sentence

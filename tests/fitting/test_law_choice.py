@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.fitting.alternatives import CANDIDATES, compared_laws, fit_candidate, force_N
-from tribo.fitting.dependence import dependence
+from tribo.fitting.alternatives import CANDIDATES, compared_laws, dependence, fit_candidate, force_N
 from tribo.fitting.linear import levels_of, meant_to_be_one
 from tribo.records import Campaign, Ingested, Pattern, Pull, Test
 

@@ -12,10 +12,7 @@ import pytest
 from support.virtual_slips import slips, velocity_step
 
 from tribo.slider import SliderConfig, constant_speed, simulate_slider, speed_steps
-from tribo.tracelaws import fit_slips
-from tribo.tracelaws.of_campaign import chosen_step_laws
-from tribo.tracelaws.slip_fits import clearly_better, slip_force
-from tribo.tracelaws.step_fits import fit_laws, whitening
+from tribo.tracelaws import chosen_step_laws, clearly_better, fit_laws, fit_slips, slip_force, whitening
 
 COULOMB = {"mass_kg": 0.03, "stiffness": 170.0, "damping": 0.3, "load_N": 0.3, "speed_m_s": 1e-3, "mu_s": 0.36,
            "mu_d": 0.30, "scatter": 0.004, "duration_s": 12.0, "noise_N": 3e-4}  # fmt: skip

@@ -11,9 +11,8 @@ import click
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, ExportPath, GivenPath, command_options, open_streams
-from tribo.cli.design_commands import design, map_family
+from tribo.cli.model_commands import design, map_family, simulate
 from tribo.cli.setup_commands import init
-from tribo.cli.simulate_command import simulate
 from tribo.cli.study_commands import compare, compare_reports, demo, diagnose, discover, fit, ingest, predict, report
 from tribo.cli.study_options import CAMPAIGN, corrected, reading_options
 from tribo.user_text import did_you_mean

@@ -62,8 +62,7 @@ def init(console: Console, folder: Path, raw: Path | None, dry_run: bool, **opti
     """
     if raw is None:
         return _template(console, folder)
-    from tribo.drafting.draft import texts, write_draft
-    from tribo.drafting.draft_table import draft_from_table
+    from tribo.drafting.draft import draft_from_table, texts, write_draft
     from tribo.readers import columns_from_text
     from tribo.records import UNCORRECTED
 
@@ -105,8 +104,7 @@ def _template(console: Console, folder: Path) -> int:
 
 def _from_exports(raw: Path, **stated: Any) -> Draft:
     """The draft of a folder of exports; of one table of evaluated forces where the columns say that it is one."""
-    from tribo.drafting.draft import draft_campaign, exports_in
-    from tribo.drafting.draft_table import draft_from_table, is_table_of_forces
+    from tribo.drafting.draft import draft_campaign, draft_from_table, exports_in, is_table_of_forces
     from tribo.errors import CampaignError
     from tribo.readers.columns import TABLE_OPTION
 

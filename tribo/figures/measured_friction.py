@@ -13,8 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tribo.comparison.study_lookup import sample_numbers, shown
 from tribo.figures import style
-from tribo.fitting.alternatives import force_N
-from tribo.fitting.dependence import SPEED, measured_points, test_values, variables_of
+from tribo.fitting.alternatives import SPEED, force_N, measured_points, test_values, variables_of
 from tribo.fitting.linear import meant_to_be_one
 from tribo.records import REGIMES, Study
 from tribo.vocabulary import label_with_unit

@@ -24,9 +24,8 @@ import numpy as np
 import pandas as pd
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.alternatives import compared_laws, fit_three_term, mixed_model
+from tribo.fitting.alternatives import compared_laws, dependence, fit_three_term, mixed_model
 from tribo.fitting.budget import NUMBERS, PRESSURE_PA, campaign_budgets, sensitivities
-from tribo.fitting.dependence import dependence
 from tribo.fitting.linear import (
     WEIGHTS,
     Rows,

@@ -129,11 +129,13 @@ def _restart_cells(pull: Pull) -> dict[str, object]:
 
 def trace_laws_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
     """One row per parameter of every law that was read from a whole trace; None where none was."""
-    from tribo.tracelaws.of_campaign import rows_of
-
     if not study.trace_laws:
         return None
-    return pd.DataFrame(rows_of(study.trace_laws), columns=outputs.product("tracelaws.csv").column_names)
+    rows = [
+        (law.test_id, law.law, p.name, p.value, p.low, p.high, p.unit, "yes" if p.told else "cannot be told")
+        for law in study.trace_laws for p in law.parameters
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=outputs.product("tracelaws.csv").column_names)
 
 
 def restarts_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:

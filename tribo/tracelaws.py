@@ -1,0 +1,618 @@
+"""Friction laws and machines read from whole traces: from slips, and from steps of speed.
+
+Which records of a campaign hold a law beyond mu and tau0, slips under Coulomb friction or its growth at rest (maximum
+likelihood over slips), and rate and state from steps of speed (least squares of whitened residuals).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.optimize import least_squares, minimize
+from scipy.stats import t as student
+
+from tribo.records import FloatArray, Ingested, Phase, Slip, Test, Trace, TraceLaw, TraceLawParameter
+from tribo.slider.motion import Drive, speed_steps
+from tribo.slider.rate_and_state import WEIGHTS, integrated
+from tribo.traces.events import slips_of
+from tribo.traces.signal import median_of_three
+
+SLIP_LAWS = ("coulomb", "ageing")
+FEWEST_SLIPS = 8
+_FEWEST_IN_SLIP = 8  # samples between peak and trough from which on the slip itself is fitted
+_LOADING = (0.3, 0.95)  # share of the time of a loading between which its slope is taken
+_OUTLIER = 5.0  # median deviations from the median beyond which a slip does not count
+_MAD = 1.4826
+_CLEAR = 2.0  # standard errors by which a law must predict slips left out better
+
+
+def fit_slips(
+    time_s: FloatArray, force_N: FloatArray, law: str, normal_load_N: float, speed_m_s: float,
+    slips: Sequence[Slip] | None = None,
+) -> TraceLaw | None:  # fmt: skip
+    """Friction law and machine from the slips of a record of stick-slip at constant speed; None with too few slips.
+
+    Between slips the force rises at k v. Within a slip it follows the damped oscillation of a slider under Coulomb
+    friction; each slip gives its own static and sliding friction, mass and damping. Over the slips each is normal, with
+    a correlation from one slip to the next that is estimated; the intervals are those of its mean. Under "ageing" the
+    static friction of a slip is mu_s + b ln(time stuck / 1 s) with normal scatter. The time stuck is itself a result of
+    static friction, so the likelihood is that of the times stuck given the troughs before them.
+
+    Parameters
+    ----------
+    time_s, force_N
+        The record, shape (n,), in s and N.
+    law : "coulomb" or "ageing"
+        The law.
+    normal_load_N, speed_m_s
+        Normal load and speed of the drive.
+    slips
+        The slips of the record, as in ``Pull.slips``; by default those that :func:`tribo.traces.slips_of` finds.
+
+    Returns
+    -------
+    TraceLaw
+        mu_s, mu_d, stiffness_N_per_m, mass_kg, damping_N_s_per_m (and b) with 95 % intervals. Where the record has too
+        few samples in a slip, mass and damping cannot be told, and sliding friction lies between the trough (a slip
+        that is stopped by damping) and the middle of peak and trough (one without).
+    """
+    time, force = np.asarray(time_s, float), np.asarray(force_N, float)
+    found = _of_every_slip(time, force, slips_of(time, force, speed_m_s=speed_m_s) if slips is None else slips)
+    if found is None:
+        return None
+    peak, trough, slope, stuck, before, shapes = found
+    stiffness = _mean("stiffness_N_per_m", slope / speed_m_s, "N/m")
+    rows = [stiffness]
+    if shapes.shape[0] >= FEWEST_SLIPS:
+        static, sliding, omega, gamma = shapes.T
+        mass = slope[: omega.size].mean() / speed_m_s / omega**2
+        rows += [_mean("mu_d", sliding / normal_load_N, "1"), _mean("mass_kg", mass, "kg")]
+        rows.append(_mean("damping_N_s_per_m", 2.0 * gamma * mass, "N s/m"))
+        held = _mean("mu_s", static / normal_load_N, "1")
+    else:
+        middle = _mean("mu_d", 0.5 * (peak + trough) / normal_load_N, "1")
+        lowest = _mean("mu_d", trough / normal_load_N, "1")
+        rows.append(TraceLawParameter("mu_d", middle.value, lowest.low, middle.high, "1", False))
+        for name, unit in (("mass_kg", "kg"), ("damping_N_s_per_m", "N s/m")):
+            rows.append(TraceLawParameter(name, math.nan, 0.0, math.inf, unit, False))
+        held = _mean("mu_s", peak / normal_load_N, "1")
+    scores = _scores(before, slope, stuck, law)
+    if law == "ageing":
+        rows = [*_ageing(before, slope, stuck, normal_load_N, peak.mean() - trough.mean()), *rows]
+    else:
+        rows = [held, *rows]
+    return TraceLaw(law, tuple(rows), float(scores.sum()), peak.size, "slips", tuple(scores))
+
+
+def _of_every_slip(
+    time: FloatArray, force: FloatArray, slips: Sequence[Slip]
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Of every slip: peak, trough, loading slope before it, time stuck, force at which it was stuck first, and of those
+    with enough samples static and sliding force, frequency and damping rate of the slip."""
+    calm = median_of_three(force)
+    if len(slips) <= FEWEST_SLIPS:
+        return None
+    fails, ends = (np.searchsorted(time, [getattr(slip, name) for slip in slips]) for name in ("fail_s", "end_s"))
+    tops, troughs, begin = [], [], int(fails[0])
+    for end, following in zip(ends, [*fails[1:], ends[-1]], strict=True):
+        tops.append(begin + int(np.argmax(calm[begin : end + 1])))
+        begin = tops[-1] + int(np.argmin(calm[tops[-1] : following + 1]))
+        troughs.append(begin)
+    kept, shapes = [], []
+    for (_, start), (p, q) in pairwise(zip(tops, troughs, strict=True)):
+        if p - start < 5:
+            continue
+        t, f = time[start:p], force[start:p]
+        inside = slice(int(_LOADING[0] * t.size), max(int(_LOADING[1] * t.size), int(_LOADING[0] * t.size) + 3))
+        if t[inside].size < 3:
+            continue
+        pace, level = np.polyfit(t[inside] - t[0], f[inside], 1)
+        if not pace > 0:
+            continue
+        kept.append((p, q, start, pace, level))
+    if len(kept) < FEWEST_SLIPS:
+        return None
+    pace = float(np.median([row[3] for row in kept]))
+    for p, q, start, _, _ in kept:
+        if q - p >= _FEWEST_IN_SLIP:
+            shape = _shape(time, force, p, q, start, pace)
+            if shape is not None:
+                shapes.append(shape)
+    resolved = len(shapes) >= max(FEWEST_SLIPS, len(kept) // 2)
+    peak, trough = (calm[[row[k] for row in kept]] for k in range(2))
+    level = np.array([row[4] for row in kept])  # the line of the loading, at the trough before it
+    stuck = (peak - level) / pace
+    good = stuck > 0
+    slopes = np.array([row[3] for row in kept])
+    shaped = np.array(shapes) if resolved else np.zeros((0, 4))
+    return peak[good], trough[good], slopes[good], stuck[good], level[good], shaped
+
+
+def _shape(
+    time: FloatArray, force: FloatArray, p: int, q: int, start: int, pace: float
+) -> FloatArray | None:
+    """Static and sliding force, frequency and damping rate of one slip, by least squares about it.
+
+    Noise shifts the estimates of one slip, and does so in all slips alike. How far is found by a second fit, to the
+    first one with its residuals in reversed order, and taken off (Efron and Tibshirani, An Introduction to the
+    Bootstrap, 1993, chapter 10).
+    """
+    width = q - p
+    a, b = max(p - max(2 * width, 20), start + (p - start) // 3), min(q + width // 2, time.size)
+    t, f = time[a:b] - time[p], force[a:b]
+    duration, size = float(time[q] - time[p]), max(float(force[p] - force[q]), 1e-300)
+    turn = math.pi / duration
+    begin = np.array([0.0, force[p], 0.5 * (force[p] + force[q]), turn, 0.1 * turn])
+    scale = np.array([duration, size, size, turn, turn])
+    low = np.array([-duration, -np.inf, -np.inf, 0.2 * turn, -0.5 * turn])
+    high = np.array([duration, np.inf, np.inf, 5.0 * turn, 2.0 * turn])
+
+    def fitted(f: FloatArray, begin: FloatArray) -> FloatArray:
+        def residuals(x: FloatArray) -> FloatArray:
+            return (slip_force(t, x[0], x[1], x[2], x[3], x[4], pace) - f) / size
+
+        return np.asarray(least_squares(residuals, begin, x_scale=scale, bounds=(low, high), max_nfev=60).x)
+
+    first = fitted(f, begin)
+    if not first[1] > first[2] or np.isclose(first[3:], [low[3], high[4]], rtol=1e-6).any():
+        return None
+    model = slip_force(t, first[0], first[1], first[2], first[3], first[4], pace)
+    x = 2.0 * first - fitted(model + (f - model)[::-1], np.clip(first, low + 1e-9 * scale, high - 1e-9 * scale))
+    return np.array([x[1], x[2], math.sqrt(x[3] ** 2 + x[4] ** 2), x[4]])
+
+
+def slip_force(
+    t: FloatArray, start_s: float, static_N: float, sliding_N: float, omega: float, gamma: float, pace_N_per_s: float
+) -> FloatArray:
+    """Force on a slider that is loaded at a pace, slips once under Coulomb friction and sticks again, in closed form.
+
+    ``omega`` is the damped frequency, ``gamma`` the damping rate. Its mass times its acceleration is F - sliding_N, a
+    damped oscillation. It begins at static_N - sliding_N; there its slope is that of loading less what the damper loses
+    as the slider starts. It ends where its integral, the momentum of the slider, is zero again.
+    """
+    excess, s = static_N - sliding_N, np.asarray(t, float) - start_s
+    sine = (pace_N_per_s - gamma * excess) / omega
+
+    def swing(u: FloatArray | float) -> FloatArray:
+        after = np.asarray(u)
+        return np.exp(-gamma * after) * (excess * np.cos(omega * after) + sine * np.sin(omega * after))
+
+    def momentum(u: FloatArray) -> FloatArray:
+        fade, c, d = np.exp(-gamma * u), np.cos(omega * u), np.sin(omega * u)
+        return excess * (fade * (omega * d - gamma * c) + gamma) - sine * (fade * (gamma * d + omega * c) - omega)
+
+    grid = np.linspace(0.5 * math.pi / omega, 2.0 * math.pi / omega, 400)
+    left = momentum(grid)
+    gone = np.flatnonzero(left <= 0.0)
+    if gone.size and gone[0] > 0:
+        i = int(gone[0])
+        stop = float(grid[i - 1] + left[i - 1] / (left[i - 1] - left[i]) * (grid[i] - grid[i - 1]))
+    else:
+        stop = float(grid[-1])
+    last = float(swing(stop))
+    sliding = sliding_N + swing(np.clip(s, 0.0, stop))
+    return np.where(
+        s < 0.0, static_N + pace_N_per_s * s,
+        np.where(s < stop, sliding, sliding_N + last + pace_N_per_s * (s - stop)),
+    )  # fmt: skip
+
+
+def _mean(name: str, values: FloatArray, unit: str) -> TraceLawParameter:
+    """Mean over slips with its 95 % interval, for normal values correlated from one to the next."""
+    middle = float(np.median(values))
+    width = _MAD * float(np.median(np.abs(values - middle)))
+    kept = values[np.abs(values - middle) <= _OUTLIER * width] if width > 0 else values
+    n, centred = kept.size, kept - kept.mean()
+    power = float(centred @ centred)
+    rho = max(0.0, float(centred[1:] @ centred[:-1]) / power + 1.0 / n) if power > 0 else 0.0  # less its bias
+    effective = max(n * (1.0 - min(rho, 0.95)) / (1.0 + min(rho, 0.95)), 2.0)
+    half = float(student.ppf(0.975, max(effective - 1.0, 1.0)) * kept.std(ddof=1) / math.sqrt(effective))
+    value = float(kept.mean())
+    return TraceLawParameter(name, value, value - half, value + half, unit, bool(half < abs(value)))
+
+
+def _cost(p: FloatArray, before: FloatArray, slope: FloatArray, stuck: FloatArray) -> FloatArray:
+    """Minus the log density of every time stuck: the force reached then is static friction, with normal scatter.
+
+    With F = before + slope h and F_s = A + B ln h the scatter is F - F_s, and its change with h is slope - B / h.
+    """
+    A, B, log_sd = p
+    scatter = before + slope * stuck - A - B * np.log(stuck)
+    change = np.abs(slope - B / stuck)
+    return 0.5 * (scatter * np.exp(-log_sd)) ** 2 + log_sd - np.log(np.maximum(change, 1e-300))
+
+
+def _fit_static(
+    before: FloatArray, slope: FloatArray, stuck: FloatArray, growing: bool
+) -> tuple[FloatArray, FloatArray]:
+    """A, B and the logarithm of the scatter of greatest likelihood, and their covariance."""
+    peak = before + slope * stuck
+    start = np.array([peak.mean(), 0.0, math.log(max(peak.std(), 1e-12))])
+
+    def total(p: FloatArray) -> float:
+        return float(_cost(np.array([p[0], p[1] if growing else 0.0, p[-1]]), before, slope, stuck).sum())
+
+    first = start if growing else start[[0, 2]]
+    size = np.array([peak.std(), peak.std(), 1.0]) if growing else np.array([peak.std(), 1.0])
+    size = np.maximum(size, 1e-12)
+    best = minimize(lambda u: total(first + size * u), np.zeros(first.size), method="Nelder-Mead",
+                    options={"xatol": 1e-6, "fatol": 1e-8, "maxiter": 4000, "maxfev": 4000})  # fmt: skip
+    n = first.size
+    hessian, step = np.empty((n, n)), 1e-3
+
+    def at(*moves: tuple[int, float]) -> float:
+        u = best.x.copy()
+        for i, d in moves:
+            u[i] += d
+        return total(first + size * u)
+
+    for i in range(n):
+        for j in range(n):
+            even = at((i, step), (j, step)) + at((i, -step), (j, -step))
+            hessian[i, j] = (even - at((i, step), (j, -step)) - at((i, -step), (j, step))) / (4 * step**2)
+    covariance = np.linalg.pinv(hessian) * np.outer(size, size)
+    found = first + size * best.x
+    return (found if growing else np.array([found[0], 0.0, found[1]])), np.asarray(covariance, float)
+
+
+def _ageing(
+    before: FloatArray, slope: FloatArray, stuck: FloatArray, normal_load_N: float, drop_N: float
+) -> list[TraceLawParameter]:
+    """mu_s after 1 s at rest, and b per e-fold of the time at rest."""
+    p, covariance = _fit_static(before, slope, stuck, True)
+    factor = float(student.ppf(0.975, max(stuck.size - 3, 1)))
+    half = factor * np.sqrt(np.maximum(np.diag(covariance)[:2], 0.0))
+    told = bool(half[1] < 0.5 * drop_N)
+    value, half = p[:2] / normal_load_N, half / normal_load_N
+    return [
+        TraceLawParameter(name, float(value[k]), float(value[k] - half[k]), float(value[k] + half[k]), "1", told)
+        for k, name in enumerate(("mu_s_after_1_s", "b"))
+    ]
+
+
+def _scores(before: FloatArray, slope: FloatArray, stuck: FloatArray, law: str) -> FloatArray:
+    """Log density of every slip by a fit without the fifth of the slips, following each other, that it stands in."""
+    n = stuck.size
+    fold = np.arange(n) * 5 // n
+    scores = np.empty(n)
+    for k in range(5):
+        out = fold == k
+        p, _ = _fit_static(before[~out], slope[~out], stuck[~out], law == "ageing")
+        scores[out] = -_cost(p, before[out], slope[out], stuck[out])
+    return scores
+
+
+def clearly_better(one: TraceLaw, other: TraceLaw) -> bool:
+    """Whether a law predicts slips left out better than another, by twice the standard error of the difference."""
+    gain = np.array(one.scores) - np.array(other.scores)
+    return bool(gain.mean() > _CLEAR * gain.std(ddof=1) / math.sqrt(gain.size))
+
+
+Filter = Callable[[FloatArray], FloatArray]
+STEP_LAWS = ("dieterich", "ruina")
+_TOLERANCE = 1e-9  # of the integration; noise of records is a thousand times larger at the least
+_MOST_LAGS = 8  # order of the autoregressive noise, chosen up to here by the Akaike criterion
+_ROUNDS = 3  # of fit, noise, fit
+_AFTER, _BEFORE = 30.0, 15.0  # characteristic slips that are kept of a record after the last and before the first step
+_FEWEST = 40  # samples of a stretch
+_FROM_DIRECT = (0.05, 0.2, 0.8)  # starts: characteristic slip as a share of the slip after the step, in steps of four
+_STIFFEST = 5.0  # logarithm of the largest stiffness over its start: far beyond, a machine is rigid and steps tiny
+_UNTOLD_SD = math.log(10.0) / (2 * 1.96)  # of a logarithm: the 95 % interval is a factor of ten wide
+
+
+def fit_steps(
+    time_s: FloatArray, friction: FloatArray, drive: Drive, law: str, stiffness_per_m: float = math.nan
+) -> TraceLaw:
+    """Rate and state, and the machine, from a record of friction under steps of speed.
+
+    The slider has no inertia. The model is friction of the law under the drive, with a steady drift per slip. Noise is
+    autoregressive; its order and coefficients follow from the residuals, and the fit is repeated on whitened residuals.
+    Intervals are those of the curvature of the likelihood (Laplace) in a, b and the logarithms of Dc and stiffness.
+
+    Parameters
+    ----------
+    time_s, friction
+        Evenly sampled record, shape (n,); friction is force over normal load.
+    drive
+        Speeds of the drive; time counts from the first sample.
+    law : "dieterich" or "ruina"
+        Ageing or slip law, with one state.
+    stiffness_per_m
+        Stiffness of the machine over the normal load in 1/m, where it is known; else it is fitted.
+
+    Returns
+    -------
+    TraceLaw
+        mu0 at the first speed, a, b, a - b, Dc_m and stiffness_per_m with 95 % intervals. A parameter whose interval is
+        wider than a factor of ten (a - b: wider than a itself) cannot be told.
+    """
+    return fit_laws(time_s, friction, drive, (law,), stiffness_per_m)[0]
+
+
+def fit_laws(
+    time_s: FloatArray, friction: FloatArray, drive: Drive, laws: Sequence[str], stiffness_per_m: float = math.nan
+) -> list[TraceLaw]:
+    """As :func:`fit_steps` for several laws, on one stretch of the record: their likelihoods can be compared."""
+    time, mu = time_s - time_s[0], friction
+    starts = {law: _best_of_starts(time, mu, drive, law, stiffness_per_m) for law in laws}
+    near = _near_steps(time, mu, drive, math.exp(max(start[4] for start in starts.values())))
+    return [_fit_near(*near, law, stiffness_per_m, start) for law, start in starts.items()]
+
+
+def _fit_near(
+    time: FloatArray, mu: FloatArray, drive: Drive, law: str, stiffness_per_m: float, first: FloatArray
+) -> TraceLaw:
+    """The fit of one law to one stretch."""
+    best, jacobian, whitened = _fitted(time, mu, drive, law, stiffness_per_m, first)
+    n, free = whitened.size, best.size
+    variance = float(whitened @ whitened) / (n - free)
+    # Jeffreys: a singular curvature means a parameter without effect, whose interval is then infinite
+    values, vectors = np.linalg.eigh(jacobian.T @ jacobian)
+    kept = np.maximum(values, 1e-14 * values.max())
+    covariance = variance * (vectors / kept) @ vectors.T
+    spread = np.sqrt(np.diag(covariance))
+    factor = float(student.ppf(0.975, n - free))
+    rows = [_linear("mu0", best[0], factor * spread[0], True)]
+    told_a, told_b = spread[2] < abs(best[2]), spread[3] < max(abs(best[3]), abs(best[2]))
+    rows += [_linear("a", best[2], factor * spread[2], told_a), _linear("b", best[3], factor * spread[3], told_b)]
+    difference = math.sqrt(covariance[2, 2] + covariance[3, 3] - 2 * covariance[2, 3])
+    rows.append(_linear("a_minus_b", best[2] - best[3], factor * difference, difference < abs(best[2])))
+    names = [("Dc_m", "m")] + ([("stiffness_per_m", "1/m")] if free > 5 else [])
+    for k, (name, unit) in enumerate(names, 4):
+        reach = min(factor * spread[k], 50.0)
+        value = math.exp(best[k])
+        low, high = value * math.exp(-reach), value * math.exp(reach)
+        rows.append(TraceLawParameter(name, value, low, high, unit, bool(spread[k] < _UNTOLD_SD)))
+    log_likelihood = -0.5 * n * math.log(float(whitened @ whitened) / n)
+    return TraceLaw(law, tuple(rows), log_likelihood, n, "steps of speed")
+
+
+def _linear(name: str, value: float, half: float, told: bool) -> TraceLawParameter:
+    return TraceLawParameter(name, float(value), float(value - half), float(value + half), "1", bool(told))
+
+
+def _near_steps(
+    time: FloatArray, mu: FloatArray, drive: Drive, slip_m: float
+) -> tuple[FloatArray, FloatArray, Drive]:
+    """The stretch about the steps: far from them a record tells of its drift, which need not be steady."""
+    knots, speeds = drive.knots_s, drive.speeds_m_s
+    start = max(knots[1] - _BEFORE * slip_m / speeds[0], 0.0) if len(knots) > 1 else 0.0
+    end = knots[-1] + _AFTER * slip_m / speeds[-1]
+    inside = (time >= start) & (time <= end)
+    before = int((inside & (time < knots[1])).sum()) if len(knots) > 1 else _FEWEST
+    if before < _FEWEST or int(inside.sum()) - before < _FEWEST:
+        return time, mu, drive
+    first = float(time[inside][0])
+    moved = Drive(drive.label, (0.0, *(k - first for k in knots[1:])), speeds)
+    return time[inside] - first, mu[inside], moved
+
+
+def _model(time: FloatArray, drive: Drive, law: str, stiffness_per_m: float) -> Filter:
+    """Friction at the times by mu0, drift, a, b, ln Dc and, where it is not known, ln stiffness; NaN if impossible."""
+    knots, speeds = np.array(drive.knots_s), np.array(drive.speeds_m_s)
+    v0 = float(speeds[0])
+    place = drive.position_m(time)
+    place = (place - place.mean()) / np.ptp(place)
+    out = np.empty((2, time.size))
+
+    def friction(p: FloatArray) -> FloatArray:
+        stiffness = stiffness_per_m if p.size < 6 else math.exp(p[5])
+        parameters = np.array([p[0], v0, p[2], stiffness])
+        possible = p[2] > 0.0 and integrated(
+            np.array([p[0], 0.0]), time, knots, speeds, parameters, p[3:4], np.exp(p[4:5]), law == "dieterich",
+            _TOLERANCE, WEIGHTS, out,
+        )  # fmt: skip
+        return out[0] + p[1] * place if possible else np.full(time.size, np.nan)
+
+    return friction
+
+
+def _best_of_starts(
+    time: FloatArray, mu: FloatArray, drive: Drive, law: str, stiffness_per_m: float
+) -> FloatArray:
+    """A fit under white noise of every tenth to hundredth sample, the best of several characteristic slips."""
+    knots, speeds = np.array(drive.knots_s), np.array(drive.speeds_m_s)
+    step = float(np.log(speeds[1] / speeds[0])) if speeds.size > 1 else 1.0
+    before = mu[time < knots[1]] if knots.size > 1 else mu[:1]
+    after = mu[time >= knots[-1]]
+    change = float(np.median(after[after.size // 2 :]) - np.median(before)) / step
+    slip = float(np.ptp(drive.position_m(time[time >= knots[-1]])))
+    direct = max(abs(change), 0.02 * float(np.median(before)))
+    thin = slice(None, None, max(1, time.size // 1500))
+    found = []
+    for share in _FROM_DIRECT:
+        Dc = share * slip / 10.0
+        start = np.array([float(np.median(before)), 0.0, direct, direct - change, math.log(Dc)])
+        if math.isnan(stiffness_per_m):
+            start = np.append(start, math.log(max(10.0 * abs(direct - change), direct) / Dc))
+        fitted = _least(_model(time[thin], drive, law, stiffness_per_m), mu[thin], start, lambda r: r)
+        found.append((float(fitted.cost), fitted.x))
+    return min(found, key=lambda item: item[0])[1]
+
+
+def _least(
+    model: Filter, mu: FloatArray, start: FloatArray, white: Filter
+) -> Any:
+    """scipy's least squares of whitened residuals; parameters that are impossible are far away."""
+    size = 100.0 * float(np.ptp(mu))
+
+    def residuals(p: FloatArray) -> FloatArray:
+        return white(np.nan_to_num(model(p) - mu, nan=size))
+
+    direct = max(start[2], 1e-4)
+    scale = np.concatenate([[1.0, 0.05, direct, max(abs(start[3]), direct)], np.ones(start.size - 4)])
+    low = np.array([-np.inf, -np.inf, 1e-6, -np.inf, start[4] - 8.0, -np.inf])[: start.size]
+    high = np.array([np.inf, np.inf, np.inf, np.inf, start[4] + 8.0, np.inf])[: start.size]
+    if start.size > 5:
+        low[5], high[5] = start[5] - _STIFFEST, start[5] + _STIFFEST
+    return least_squares(residuals, start, x_scale=scale, bounds=(low, high), max_nfev=60, diff_step=1e-5)
+
+
+def _fitted(
+    time: FloatArray, mu: FloatArray, drive: Drive, law: str, stiffness_per_m: float, start: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Best values, and slopes and residuals whitened by the noise that the residuals show."""
+    model = _model(time, drive, law, stiffness_per_m)
+    white: Filter = lambda r: r  # noqa: E731
+    fitted = None
+    for _ in range(_ROUNDS):
+        fitted = _least(model, mu, start, white)
+        start = fitted.x
+        white = whitening(mu - model(start))
+    fitted = _least(model, mu, start, white)
+    return fitted.x, np.asarray(fitted.jac), np.asarray(fitted.fun)
+
+
+def whitening(residuals: FloatArray) -> Filter:
+    """A filter that makes noise like these residuals white: autoregressive, of an order by the Akaike criterion."""
+    r = residuals - residuals.mean()
+    n = r.size
+    covariances = np.array([float(r[: n - k] @ r[k:]) / n for k in range(_MOST_LAGS + 1)])
+    best, score = np.zeros(0), n * math.log(covariances[0])
+    for order in range(1, _MOST_LAGS + 1):
+        weights = solve_toeplitz(covariances[:order], covariances[1 : order + 1])
+        left = covariances[0] - float(weights @ covariances[1 : order + 1])
+        if left > 0 and n * math.log(left) + 2 * order < score:
+            best, score = weights, n * math.log(left) + 2 * order
+    kernel = np.concatenate([[1.0], -best])
+    return lambda x: np.convolve(x, kernel, mode="valid") if kernel.size > 1 else x
+
+
+_STEADY = "steady sliding"
+_SMALLEST_STEP = math.log(1.3)  # change of the logarithm of the speed from which on it is a step
+_LIKELIER = 3.0  # log likelihood by which one of two laws of equal size must be better: a ratio of 20 to 1
+
+
+def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]:
+    """Laws fitted to the records of a campaign that show stick-slip or steps of speed, in the order of its tests.
+
+    Parameters
+    ----------
+    ingested
+        The campaign with its traces.
+    law
+        "auto", or the name of one law. Under "auto" the ageing law is chosen over Coulomb's where it predicts slips
+        left out better by twice the standard error, and the ageing law of Dieterich or the slip law of Ruina where its
+        likelihood is 20 times that of the other; laws that are tied are all given.
+    """
+    tests = {test.test_id: test for test in ingested.campaign.tests}
+    found: list[TraceLaw] = []
+    for name, pieces in groupby(ingested.traces.items(), key=lambda item: _record_of(item[0])):
+        traces = list(pieces)
+        test, pull = tests.get(traces[0][0]), ingested.pulls.get(traces[0][0])
+        if test is None or pull is None or not test.normal_load_N > 0:
+            continue
+        fitted = [
+            *_of_slips(traces, ingested, tests, law),
+            *_of_steps(traces, ingested, tests, law),
+        ]
+        found += [replace(one, test_id=one.test_id or name) for one in fitted]
+    return tuple(found)
+
+
+def _record_of(test_id: str) -> str:
+    """The record that a test was cut from: levels of one record are named ID#1/1, ID#1/2 and so on."""
+    head, _, level = test_id.rpartition("/")
+    return head if "#" in head and level.isdigit() else test_id
+
+
+def _joined(traces: Sequence[Trace]) -> Trace:
+    """The pieces of a record as one trace, in order of time."""
+    if len(traces) == 1:
+        return traces[0]
+    order = sorted(traces, key=lambda trace: float(trace.time_s[0]))
+    time = np.concatenate([trace.time_s for trace in order])
+    keep = np.concatenate([[True], np.diff(time) > 0])
+    place = [trace.displacement_m for trace in order if trace.displacement_m is not None]
+    return replace(
+        order[0], time_s=time[keep], force_N=np.concatenate([trace.force_N for trace in order])[keep],
+        displacement_m=np.concatenate(place)[keep] if len(place) == len(order) else None, columns={},
+    )  # fmt: skip
+
+
+def _of_slips(
+    traces: Iterable[tuple[str, Trace]], ingested: Ingested, tests: dict[str, Test], law: str
+) -> Iterable[TraceLaw]:
+    """Coulomb friction or its growth at rest, of every piece with stick-slip."""
+    for test_id, trace in traces:
+        pull, test = ingested.pulls.get(test_id), tests[test_id]
+        speed = test.speed_m_s or ingested.campaign.pull_speed_m_s
+        shows = pull is not None and pull.oscillation is not None and pull.oscillation.regime == "stick-slip"
+        if not shows or pull is None or speed is None or not speed > 0 or law not in ("auto", *SLIP_LAWS):
+            continue
+        start = pull.window_s[0]
+        inside = trace.time_s >= start
+        record = trace.time_s[inside], np.abs(trace.force_N[inside] - pull.zero_N)
+        wanted = SLIP_LAWS if law == "auto" else (law,)
+        slips = [slip for slip in pull.slips if slip.fail_s > start]
+        made = [fit_slips(*record, name, test.normal_load_N, speed, slips) for name in wanted]
+        fitted = [replace(one, test_id=test_id) for one in made if one is not None]
+        yield from chosen_slip_laws(fitted)
+
+
+def chosen_slip_laws(fitted: Sequence[TraceLaw]) -> list[TraceLaw]:
+    """Those that no other law beats on slips left out, by twice the standard error of the difference."""
+    return [law for law in fitted if not any(clearly_better(other, law) for other in fitted)]
+
+
+def chosen_step_laws(fitted: Sequence[TraceLaw]) -> list[TraceLaw]:
+    """Those whose likelihood is not 20 times below that of the best."""
+    best = max(one.log_likelihood for one in fitted)
+    return [one for one in fitted if one.log_likelihood > best - _LIKELIER]
+
+
+def _of_steps(
+    traces: Sequence[tuple[str, Trace]], ingested: Ingested, tests: dict[str, Test], law: str
+) -> Iterable[TraceLaw]:
+    """Rate and state of a record with steps of speed, whose pieces are joined."""
+    if law not in ("auto", *STEP_LAWS):
+        return
+    test, pulls = tests[traces[0][0]], [ingested.pulls[name] for name, _ in traces if name in ingested.pulls]
+    trace, pull = _joined([trace for _, trace in traces]), pulls[0]
+    phases = sorted((phase for pull in pulls for phase in pull.phases), key=lambda phase: phase.start_s)
+    steps = _drive_of(trace, phases)
+    if steps is None:
+        return
+    start, end, drive = steps
+    inside = (trace.time_s >= start) & (trace.time_s <= end)
+    friction = np.abs(trace.force_N[inside] - pull.zero_N) / test.normal_load_N
+    known = test.stiffness_N_per_m / test.normal_load_N if test.stiffness_N_per_m else math.nan
+    wanted = STEP_LAWS if law == "auto" else (law,)
+    fitted = fit_laws(trace.time_s[inside], friction, drive, wanted, known)
+    yield from chosen_step_laws(fitted)
+
+
+def _drive_of(trace: Trace, phases: Sequence[Phase]) -> tuple[float, float, Drive] | None:
+    """From when to when a record slides through steps of speed, and its drive from then on; None without a step.
+
+    A step is where the lines of displacement of both stretches meet, or the end of the first stretch.
+    """
+    steady = [p for p in phases if p.name == _STEADY and p.speed_m_s > 0]
+    changes = [(a, b) for a, b in pairwise(steady) if abs(math.log(b.speed_m_s / a.speed_m_s)) > _SMALLEST_STEP]
+    if not changes:
+        return None
+    chosen = [changes[0][0], *(b for a, b in changes)]
+    start, end = chosen[0].start_s, chosen[-1].end_s
+    knots, speeds = [0.0], [_line(trace, chosen[0])[0]]
+    for a, b in pairwise(chosen):
+        (v, x), (w, y) = _line(trace, a), _line(trace, b)
+        meet = (x - y) / (w - v) if trace.displacement_m is not None and w != v else a.end_s
+        knots.append(float(np.clip(meet, a.start_s, b.end_s)) - start)
+        speeds.append(w)
+    return start, end, speed_steps(knots, speeds)
+
+
+def _line(trace: Trace, phase: Phase) -> tuple[float, float]:
+    """Speed of a stretch and where its line of displacement meets time zero; 0 where no displacement was recorded."""
+    inside = (trace.time_s >= phase.start_s) & (trace.time_s <= phase.end_s)
+    if trace.displacement_m is None or inside.sum() < 3:
+        return phase.speed_m_s, 0.0
+    slope, at_zero = np.polyfit(trace.time_s[inside], trace.displacement_m[inside], 1)
+    sign = math.copysign(1.0, slope)
+    return float(abs(slope)), float(sign * at_zero)
