@@ -18,8 +18,7 @@ import pandas as pd
 
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base
-from tribo.mechanisms_in_model.extended_run import SIMULATED, simulate_with
-from tribo.mechanisms_in_model.on_blocks import RECORDED, conditions_of_run
+from tribo.mechanisms_in_model import RECORDED, SIMULATED, conditions_of_run, simulate_with
 from tribo.springblock import SimConfig, simulate
 
 CASES = (("F", 8e3, 20.0), ("B", 4e3, 20.0), ("B", 16e3, 20.0), ("C", 8e3, 20.0), ("Sx", 8e3, 5.0))

@@ -22,8 +22,8 @@ import pattern_error
 from pattern_laws import KEPT, origin, pattern_laws, write_table
 
 from tribo.berardo2019.published_tables import table2_design
-from tribo.cache.kept_results import sources
 from tribo.diagnostics.predictor import flat_law, simulated_patterns
+from tribo.kept_results import sources
 from tribo.springblock import run_stored
 
 SEED = 0

@@ -29,8 +29,8 @@ from unittest.mock import patch
 
 from torture_processes import REPORT, differing, ensemble, finished, quick_reports, results, run, zipped_campaign
 
-from tribo.cache.kept_results import fingerprint, kept_or_made
 from tribo.errors import TriboError
+from tribo.kept_results import fingerprint, kept_or_made
 from tribo.springblock import SimConfig, simulate, stratified_design
 from tribo.springblock.kept_runs import run_stored
 
@@ -57,7 +57,7 @@ def kept_outcome(path: Path, key: str, expected: str) -> int:
     def again() -> Any:
         raise MadeAgainError
 
-    with warnings.catch_warnings(), patch("tribo.cache.kept_results.fingerprint", lambda *_: key):
+    with warnings.catch_warnings(), patch("tribo.kept_results.fingerprint", lambda *_: key):
         warnings.simplefilter("ignore")
         try:
             found = kept_or_made(path.parent, path.stem, None, again)
@@ -121,7 +121,7 @@ def flip_kept(kept: Path, work: Path, flips: int, rng: random.Random) -> Counter
         found = re.match(rb'\{"made_from": "([0-9a-f]{64})"', content)
         assert found is not None
         key = found[1].decode()
-        with patch("tribo.cache.kept_results.fingerprint", lambda *_, key=key: key):
+        with patch("tribo.kept_results.fingerprint", lambda *_, key=key: key):
             expected = fingerprint(kept_or_made(kept, intact.stem, None, dict))
         (work / intact.name).write_bytes(flipped(content, rng))
         outcomes[in_child(kept_outcome, work / intact.name, key, expected)] += 1

@@ -64,7 +64,7 @@ Once = Callable[[str, Callable[[Path], object]], Path]
 @pytest.fixture(scope="session")
 def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
     """once(name, make) -> a folder that ``make`` filled, the same in every process of this run of the tests."""
-    from tribo.cache.own_folder import only_writer
+    from tribo.own_folder import only_writer
 
     base = tmp_path_factory.getbasetemp()
     shared_by_all = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base

@@ -1,6 +1,6 @@
 """Every file that tribo writes into a folder of results: stated once, here, and written through :func:`write` alone.
 
-The tables of a study, campaign.nc, the protection of a user's own files (:mod:`tribo.cache.own_folder`),
+The tables of a study, campaign.nc, the protection of a user's own files (:mod:`tribo.own_folder`),
 :mod:`tribo.report.provenance` and the page docs/reference/files.md read this registry.
 """
 

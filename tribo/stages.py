@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tribo.cache.kept_results import kept_or_made
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
 from tribo.display import displayed
 from tribo.errors import FitError, SimulationError
+from tribo.kept_results import kept_or_made
 from tribo.records import (
     Campaign,
     Doubt,

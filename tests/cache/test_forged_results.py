@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 import pytest
 
-from tribo.cache import kept_results
-from tribo.cache.kept_results import DamagedResultWarning, encoded, fault_of_kept, kept_or_made
+from tribo import kept_results
 from tribo.comparison.prediction import kept_faults
+from tribo.kept_results import DamagedResultWarning, encoded, fault_of_kept, kept_or_made
 from tribo.springblock.kept_runs import checksum_of, fault_of, write_columns
 
 TRUE = {"friction": 0.5, "why": "measured"}

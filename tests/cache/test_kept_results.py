@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.cache.kept_results import (
+from tribo.kept_results import (
     DamagedResultWarning,
     decoded,
     encoded,
@@ -64,7 +64,7 @@ def test_a_table_with_other_numbers_or_names_is_another_input() -> None:
 def test_an_edit_of_a_source_is_another_input(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "laws").mkdir()
     source = tmp_path / "laws" / "one.py"
-    monkeypatch.setattr("tribo.cache.kept_results._PACKAGE", tmp_path)
+    monkeypatch.setattr("tribo.kept_results._PACKAGE", tmp_path)
     seen = []
     for text in ("a = 1", "a = 2"):
         source.write_text(text)
@@ -123,7 +123,7 @@ def test_a_result_of_other_sources_is_made_anew(tmp_path: Path, monkeypatch: pyt
     folder = tmp_path
     made = []
     for text in ("before the edit", "before the edit", "after it"):
-        monkeypatch.setattr("tribo.cache.kept_results.sources", lambda *code, text=text: text)
+        monkeypatch.setattr("tribo.kept_results.sources", lambda *code, text=text: text)
         made.append(counted(folder, 1)[1])
     assert made == [1, 0, 1]
 
@@ -133,7 +133,7 @@ def test_no_function_of_others_comes_back() -> None:
         decoded({"function": "os:walk"})
 
 
-@pytest.mark.parametrize("place", ["os:PathLike", "tribo.cache.kept_results:json", "tribo.files:os"])
+@pytest.mark.parametrize("place", ["os:PathLike", "tribo.kept_results:json", "tribo.files:os"])
 def test_nothing_but_records_of_tribo_is_ever_constructed(place: str) -> None:
     with pytest.raises(TypeError, match="no record of tribo"):
         decoded({"record": place, "fields": []})
@@ -156,7 +156,7 @@ def test_the_digest_of_the_package_changes_with_any_of_its_files(
     (tmp_path / "templates").mkdir()
     (tmp_path / "law.py").write_text("A = 1\n")
     (tmp_path / "templates" / "page.html").write_text("<p>")
-    monkeypatch.setattr("tribo.cache.kept_results._PACKAGE", tmp_path)
+    monkeypatch.setattr("tribo.kept_results._PACKAGE", tmp_path)
     seen = set()
     for name, text in (("law.py", "A = 1\n"), ("law.py", "A = 2\n"), ("templates/page.html", "<q>")):
         (tmp_path / name).write_text(text)
@@ -172,8 +172,8 @@ def test_the_digest_of_the_package_changes_with_the_table_of_pattern_shares(
     folder = tmp_path / "data" / "pattern_shares"
     folder.mkdir(parents=True)
     (tmp_path / "tribo").mkdir()
-    monkeypatch.setattr("tribo.cache.kept_results._PACKAGE", tmp_path / "tribo")
-    monkeypatch.setattr("tribo.cache.kept_results.data_dir", lambda: tmp_path / "data")
+    monkeypatch.setattr("tribo.kept_results._PACKAGE", tmp_path / "tribo")
+    monkeypatch.setattr("tribo.kept_results.data_dir", lambda: tmp_path / "data")
     seen = set()
     for number in (1, 2):
         (folder / "laws.csv").write_text(f"mu\n{number}\n")

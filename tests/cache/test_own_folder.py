@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from tribo.cache.own_folder import RECORD, BusyError, own_folder, recorded_outputs
 from tribo.errors import CampaignError
+from tribo.own_folder import RECORD, BusyError, own_folder, recorded_outputs
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from tribo.cache.own_folder import own_folder
+from tribo.own_folder import own_folder
 out = Path({out!r})
 with own_folder(out, shared={shared}):
     (out / "kept").mkdir(exist_ok=True)
@@ -96,7 +96,7 @@ def test_a_folder_of_a_killed_writer_is_taken_and_cleared_of_its_leftovers(tmp_p
 
 def test_forked_workers_do_not_hold_the_lock_of_a_killed_writer(tmp_path: Path) -> None:
     script = (
-        "import os, time\nfrom pathlib import Path\nfrom tribo.cache.own_folder import own_folder\n"
+        "import os, time\nfrom pathlib import Path\nfrom tribo.own_folder import own_folder\n"
         f"with own_folder(Path({str(tmp_path / 'out')!r})):\n"
         "    child = os.fork()\n    if child: print(child, flush=True)\n    time.sleep(60)\n"
     )

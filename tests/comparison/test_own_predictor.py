@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from diagnose.synthetic import PATTERNS
 
-from tribo.cache.kept_results import DamagedResultWarning
 from tribo.comparison.prediction import cells_of, kept_runs, run_cells
 from tribo.diagnostics import tabled_predictor
+from tribo.kept_results import DamagedResultWarning
 from tribo.records import Campaign, Test
 from tribo.springblock import LocalFriction, SimConfig, stratified_design
 from tribo.stages import own_predictor

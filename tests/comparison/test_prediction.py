@@ -13,7 +13,6 @@ import pytest
 from small_lattices import small_lattices
 
 from tribo import stages
-from tribo.cache.kept_results import DamagedResultWarning
 from tribo.campaign import load_campaign
 from tribo.comparison.prediction import (
     MOST_LOADS,
@@ -24,6 +23,7 @@ from tribo.comparison.prediction import (
     predict,
 )
 from tribo.errors import CampaignError, FitError
+from tribo.kept_results import DamagedResultWarning
 from tribo.records import LawFit, Regime, Run
 
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from blind.tribometer import Design
 
-from tribo.cache.kept_results import decoded, encoded
 from tribo.diagnostics.candidates import refitted
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.model import Acting, Setup
@@ -20,6 +19,7 @@ from tribo.diagnostics.verdict import Cause, Estimate
 from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.figures.extended_model import draw_law, law_numbers, law_numbers_of
+from tribo.kept_results import decoded, encoded
 from tribo.lawsearch import diagnosis_with_laws
 from tribo.lawsearch.diagnosis_with_laws import law_layers, searched_laws, separating_test, with_laws, with_misfits
 from tribo.lawsearch.grammar import (

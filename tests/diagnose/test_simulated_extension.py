@@ -100,7 +100,7 @@ def test_local_friction_gives_the_flat_law_it_was_made_for() -> None:
 def test_a_diagnosis_with_its_simulation_can_be_kept_and_read_back(hot: Diagnosis) -> None:
     import json
 
-    from tribo.cache.kept_results import decoded, encoded
+    from tribo.kept_results import decoded, encoded
 
     again = decoded(json.loads(json.dumps(encoded(hot))))
     assert again.verdict.to_json() == hot.verdict.to_json()

@@ -107,7 +107,7 @@ class RememberedFigures(Remembered):
     """Figures that have been drawn before: drawing reads and writes no file of the bench. They are written as ever."""
 
     def __init__(self, file: Path):
-        from tribo.cache.kept_results import fingerprint
+        from tribo.kept_results import fingerprint
         from tribo.report import drawings
 
         super().__init__(file)

@@ -11,7 +11,7 @@ from faults.branches import branch_trials, can_branch
 from faults.file_operations import KILL, Fault, Operation, errors_of
 from faults.small_site import Place
 from faults.test_bench import bench, careful, half_written, leaving, place as place, spoiling
-from tribo.cache.own_folder import only_writer
+from tribo.own_folder import only_writer
 
 pytestmark = pytest.mark.skipif(not can_branch(), reason="needs file systems of its own: Linux, root")
 

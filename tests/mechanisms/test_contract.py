@@ -248,6 +248,6 @@ def test_its_record_can_be_kept_and_read_back(m: Mechanism) -> None:
     """Every function in it is one of its module, not a lambda."""
     import json
 
-    from tribo.cache.kept_results import decoded, encoded
+    from tribo.kept_results import decoded, encoded
 
     assert decoded(json.loads(json.dumps(encoded(m)))) == m

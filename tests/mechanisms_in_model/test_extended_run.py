@@ -11,8 +11,15 @@ import pytest
 from tribo.errors import SimulationError
 from tribo.mechanisms import MECHANISMS, NAMES
 from tribo.mechanisms.record import Base, Conditions
-from tribo.mechanisms_in_model.extended_run import SIMULATED, choice_of, parse_given, parse_with, simulate_with
-from tribo.mechanisms_in_model.on_blocks import RECORDED, conditions_of_run
+from tribo.mechanisms_in_model import (
+    RECORDED,
+    SIMULATED,
+    choice_of,
+    conditions_of_run,
+    parse_given,
+    parse_with,
+    simulate_with,
+)
 from tribo.records import Run
 from tribo.springblock import SimConfig, simulate
 
@@ -204,7 +211,7 @@ def test_a_tilted_sample_has_its_load_off_the_middle_by_what_was_asked() -> None
     from functools import partial
 
     from tribo.mechanisms.tilt import uneven
-    from tribo.mechanisms_in_model.on_blocks import even, with_profile
+    from tribo.mechanisms_in_model import even, with_profile
     from tribo.springblock.engines.state import lattice_of
 
     flat = SMALL.with_(sample="F", angle_deg=0.0, blocks=(60, 60))

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tribo.cache.own_folder import foreign_files
 from tribo.cli import main
+from tribo.own_folder import foreign_files
 
-HOLDER = "from pathlib import Path\nfrom tribo.cache.own_folder import own_folder\nwith own_folder(Path({out!r})):\n    print('holding', flush=True)\n    input()\n"  # noqa: E501
+HOLDER = "from pathlib import Path\nfrom tribo.own_folder import own_folder\nwith own_folder(Path({out!r})):\n    print('holding', flush=True)\n    input()\n"  # noqa: E501
 
 
 @pytest.mark.parametrize("command", ["ingest", "predict", "diagnose", "report"])

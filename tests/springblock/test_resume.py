@@ -19,10 +19,10 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from tribo.cache.kept_results import DamagedResultWarning
-from tribo.cache.own_folder import BusyError
 from tribo.cli import main
 from tribo.errors import SimulationError
+from tribo.kept_results import DamagedResultWarning
+from tribo.own_folder import BusyError
 from tribo.records import Run
 from tribo.springblock import SimConfig, run_ensemble, stratified_design
 from tribo.springblock.ensemble import Work

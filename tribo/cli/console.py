@@ -29,9 +29,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cache.kept_results import DamagedResultWarning
-from tribo.cache.own_folder import BusyError, own_folder
 from tribo.errors import Problem, TriboError, failed_by_system, of_the_system, system_problem, unexpected
+from tribo.kept_results import DamagedResultWarning
+from tribo.own_folder import BusyError, own_folder
 from tribo.records import Doubt, SetAside
 from tribo.user_text import nearest, printable
 

@@ -65,7 +65,7 @@ def simulate_sliders(
     scheduler: str | None,
 ) -> None:  # fmt: skip
     """Run the slider that the options describe, or the design, and write FILE.nc."""
-    from tribo.cache.own_folder import check_file, only_writer_of
+    from tribo.own_folder import check_file, only_writer_of
     from tribo.slider import simulate_slider, write_slider_run
     from tribo.slider.slider_files import (
         SLIDER_ENSEMBLE,
@@ -293,9 +293,9 @@ def simulate(
         return
     if named := [name for name, value in own.items() if value is not None]:
         raise click.UsageError(f"{', '.join(named)}: only with --slider")
-    from tribo.cache.own_folder import check_file, only_writer_of
     from tribo.display import exact_text
     from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
+    from tribo.own_folder import check_file, only_writer_of
     from tribo.springblock.design_file import asked_runs, described_by_options, read_design, together
     from tribo.springblock.ensemble import FRICTION, Work
     from tribo.springblock.kept_runs import ENSEMBLE, ONE_RUN, fault_of, kind_of, run_stored
@@ -429,10 +429,10 @@ def design(console: Console, target: Path, out: Path, seed: int, jobs: int) -> i
     disprove each. If the same command is started again, it computes only the missing runs. The exit status is 1 where
     the target cannot be had.
     """
-    from tribo.cache.own_folder import only_writer_of
     from tribo.design.answer import design as find
     from tribo.design.answer_files import write_answer
     from tribo.design.target import read_target
+    from tribo.own_folder import only_writer_of
 
     wanted = read_target(target)
     kept = _kept(out, console)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cache.own_folder import KEPT, check_folder
 from tribo.cli.console import (
     UNUSABLE,
     Console,
@@ -41,6 +40,7 @@ from tribo.cli.study_options import (
     with_reading_options,
 )
 from tribo.errors import FitError, SimulationError, TriboError, unexpected
+from tribo.own_folder import KEPT, check_folder
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis

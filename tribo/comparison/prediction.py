@@ -18,7 +18,9 @@ from urllib.parse import quote
 
 import numpy as np
 
-from tribo.cache.kept_results import (
+from tribo.errors import CampaignError, FitError, Problem, SimulationError, failed_by_system, naming
+from tribo.files import found_in
+from tribo.kept_results import (
     FOREIGN,
     DamagedResultWarning,
     fault_of_kept,
@@ -26,8 +28,6 @@ from tribo.cache.kept_results import (
     signature,
     sources,
 )
-from tribo.errors import CampaignError, FitError, Problem, SimulationError, failed_by_system, naming
-from tribo.files import found_in
 from tribo.records import (
     REGIMES,
     Campaign,

@@ -24,7 +24,7 @@ from tribo.diagnostics.verdict import CERTAIN_CAUSES
 from tribo.display import displayed
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Values
-from tribo.mechanisms_in_model.extended_run import simulate_pair
+from tribo.mechanisms_in_model import simulate_pair
 from tribo.records import FloatArray, Run
 from tribo.springblock.config import PAPER, LocalFriction, SimConfig
 from tribo.springblock.ensemble import angle_range_deg, run_seed

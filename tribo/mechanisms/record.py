@@ -135,7 +135,7 @@ class Placement:
         Normal force and adhesion of every block over their mean, given T/N and the place of the block along the
         pull, from -1/2 (trailing edge) to 1/2, both (n,).
     chain
-        Arguments of :func:`tribo.mechanisms_in_model.on_blocks.measured`, given the recorded conditions.
+        Arguments of :func:`tribo.mechanisms_in_model.measured`, given the recorded conditions.
         Where several mechanisms set the same field, their values add.
     other_sample
         The sample is another one, named in brackets behind the mechanism; the amplitude moves ln T towards it.

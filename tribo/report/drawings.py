@@ -27,13 +27,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tribo.cache.kept_results import kept_or_made
 from tribo.errors import CampaignError, Problem, unexpected
 from tribo.figures import style
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
 from tribo.figures.style import FigureOf, as_svg, house_style
 from tribo.files import found_in, text_of, write_bytes, write_text
 from tribo.forked import each
+from tribo.kept_results import kept_or_made
 from tribo.outputs import csv_text, write
 from tribo.records import FloatArray, Study
 from tribo.temporary import temporary_folder

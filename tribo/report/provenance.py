@@ -16,13 +16,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
-from tribo.cache.own_folder import KEPT, MARK
 from tribo.comparison.prediction import kept_faults
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem, naming
 from tribo.files import bytes_of, found_below, leads_out, paths_below, text_of
 from tribo.input_files import opened_zip, pieces
 from tribo.outputs import is_product, product, write as write_output
+from tribo.own_folder import KEPT, MARK
 from tribo.records import Study
 from tribo.user_text import well_formed
 

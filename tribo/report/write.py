@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tribo import outputs
-from tribo.cache.own_folder import own_folder
+from tribo.own_folder import own_folder
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.provenance import (

@@ -23,12 +23,12 @@ from queue import Empty, Queue
 from threading import Thread
 from typing import IO, Any
 
-from tribo.cache.kept_results import package_sources
-from tribo.cache.own_folder import STATE, WAIT, check_site, is_leftover, only_writer
 from tribo.dry_run import Checked, check
 from tribo.errors import Problem, TriboError
 from tribo.files import found_below, found_in, text_of, write_text
 from tribo.forked import Limits
+from tribo.kept_results import package_sources
+from tribo.own_folder import STATE, WAIT, check_site, is_leftover, only_writer
 from tribo.site.history import collect_laws
 from tribo.site.scan import CURRENT, Dropped, clear_unfinished, date_build, difference, scan
 from tribo.site.steps import (

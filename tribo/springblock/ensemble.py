@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tribo.cache.kept_results import LIBRARIES, DamagedResultWarning, sources
 from tribo.errors import Problem, SimulationError
+from tribo.kept_results import LIBRARIES, DamagedResultWarning, sources
 from tribo.records import Pattern, Run
 from tribo.springblock.config import SimConfig
 from tribo.springblock.lattice import pattern_of

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tribo.cache.kept_results import FOREIGN, DamagedResultWarning, signature, sources
-from tribo.cache.own_folder import only_writer_of
 from tribo.display import exact_text
 from tribo.errors import Problem, SimulationError, failed_by_system
 from tribo.files import whole_hdf5
+from tribo.kept_results import FOREIGN, DamagedResultWarning, signature, sources
+from tribo.own_folder import only_writer_of
 from tribo.records import Run
 from tribo.springblock.config import SimConfig
 from tribo.springblock.ensemble import FRICTION, RESULTS, Progress, Work, check_all, finished_runs

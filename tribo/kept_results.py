@@ -28,8 +28,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from tribo.cache.own_folder import only_writer
 from tribo.files import PATTERN_SHARES, bytes_of, data_dir, found_below, found_in, write_bytes
+from tribo.own_folder import only_writer
 from tribo.temporary import private_folder
 
 T = TypeVar("T")
@@ -42,7 +42,7 @@ class DamagedResultWarning(RuntimeWarning):
 FOREIGN = "was not made by this user on this machine"
 KEY, KEY_BYTES, KEY_WAIT_S = "kept-results.key", 32, 30.0
 LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
-_PACKAGE = Path(__file__).resolve().parents[1]
+_PACKAGE = Path(__file__).resolve().parent
 
 
 def kept_or_made(
