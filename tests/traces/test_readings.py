@@ -17,7 +17,8 @@ from tribo.errors import CampaignError
 from tribo.records import Ingested, Reading, Restart, Study, Test, Trace
 from tribo.report.tables import readings_table
 from tribo.traces import PullOptions, evaluate
-from tribo.traces.readings import Part, mean_of_level, readings_of
+from tribo.traces.readings import Part, readings_of
+from tribo.traces.signal import mean_of_level
 
 TEST = Test("T1", "raw/T1.csv", "S", 10.0, "S1")
 

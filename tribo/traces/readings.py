@@ -1,9 +1,6 @@
 """What a record tells beyond one pull: plateaus, steps, cycles, running-in and holds, each with a 95 % interval.
 
-Noise and drift of a level are told apart by its cosine coefficients (Phillips 2005, Econometric Theory 21, 116; Mueller
-2007, J. Econometrics 141, 1331), which split it by how slowly it changes. A low polynomial takes off the slowest, which
-is drift of the level and no noise; the next ones give the variance of the mean, correlation counted, with as many
-degrees of freedom.
+Noise and drift of a level are told apart by its cosine coefficients, as in :func:`tribo.traces.signal.mean_of_level`.
 """
 
 from __future__ import annotations
@@ -17,14 +14,11 @@ from typing import Literal
 import numpy as np
 
 from tribo.records import CLOSED_TRACK_M, FloatArray, Interval, Phase, Pull, Reading, Test, Trace
-from tribo.traces.signal import condense, line, median_of_three
+from tribo.traces.signal import condense, line, mean_of_level, median_of_three, of_student, variance_of_slow
 from tribo.traces.sliding import transient_end
 
-_DEGREES = (1, 3, 5, 7, 9)  # of the polynomial that takes off the drift of a level: the first that leaves none
-_SLOWEST = 3  # coefficients after it in which drift that is left
-_STANDS_OUT = 2.3  # by this many times the variance of all
-_COSINES = 8  # coefficients after it that tell the noise of its mean
-_COSINES_OF_ALL = 20  # the same of a whole slide
+_COSINES_OF_ALL = 20  # coefficients that tell the noise of a whole slide
+_COSINES_OF_STEP = 8  # that of a change at once
 _COSINES_OF_STROKE = 4  # the same of a stroke, whose neighbours tell of its noise as well
 _FEWEST = 12  # samples from which on a mean has an interval
 _MIDDLE = 0.4  # share of a stroke, around its middle, whose force is that of the stroke
@@ -114,32 +108,6 @@ def readings_of(parts: Sequence[Part], viscosity_Pa_s: float = math.nan) -> tupl
     for part in parts:
         found += _holds(part)
     return tuple(sorted(found, key=lambda reading: reading.start_s))
-
-
-def mean_of_level(force_N: FloatArray) -> Interval:
-    """Mean of a level and its 95 % interval under correlated noise and slow drift; an infinite one of too few samples.
-
-    The interval is of the mean over these samples: how far a level drifts within them is no uncertainty of it.
-    """
-    mean, n = float(force_N.mean()), force_N.size
-    if n < _FEWEST:
-        return mean, -math.inf, math.inf
-    along = np.linspace(-1.0, 1.0, n)
-    for degree in _DEGREES:
-        rest = force_N - np.polynomial.legendre.legval(along, np.polynomial.legendre.legfit(along, force_N, degree))
-        variance, dof = _variance(rest, degree + 1)
-        slowest, _ = _variance(rest, degree + 1, _SLOWEST)
-        if slowest < _STANDS_OUT * variance or n < 4 * (degree + dof):
-            break
-    half = _t(dof) * math.sqrt(variance / n)
-    return mean, mean - half, mean + half
-
-
-def _t(dof: int) -> float:
-    """Half width of a 95 % interval in standard uncertainties."""
-    from scipy.stats import t
-
-    return float(t.ppf(0.975, dof))
 
 
 def _half(interval: Interval) -> float:
@@ -254,7 +222,7 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
         meets = int(np.argmax(np.append(beyond_it[:at] >= 0, True)))
         fits.append((float(((part - design @ best) ** 2).sum()), float(before[meets]), design))
     squares, top, design = min(fits, key=lambda fit: fit[0])
-    variance, _ = _variance(part - design @ np.linalg.lstsq(design, part, rcond=None)[0], 3)
+    variance, _ = variance_of_slow(part - design @ np.linalg.lstsq(design, part, rcond=None)[0], 3, _COSINES_OF_STEP)
     variance = max(variance, squares / (part.size - 3))
     near = [value for other, value, _ in fits if other <= squares + 4.0 * variance]
     leverage = float(np.linalg.pinv(design.T @ design).sum())
@@ -287,7 +255,7 @@ def _strokes(parts: Sequence[Part]) -> list[_Stroke]:
                 found.append((part, phase, force))
     if not found:
         return []
-    noise = [_variance(_without_line(force), 2, _COSINES_OF_STROKE) for _, _, force in found]
+    noise = [variance_of_slow(_without_line(force), 2, _COSINES_OF_STROKE) for _, _, force in found]
     means = np.array([float(force.mean()) for _, _, force in found])
     squares = float(np.mean([share / force.size for (share, _), (_, _, force) in zip(noise, found, strict=True)]))
     dof = sum(cosines for _, cosines in noise)
@@ -295,7 +263,7 @@ def _strokes(parts: Sequence[Part]) -> list[_Stroke]:
     apart = np.concatenate([np.diff(means[side]), np.diff(means[~side])])
     if apart.size >= _FEWEST_APART and (between := float(apart @ apart) / apart.size / 2.0) > squares:
         squares, dof = between, int(apart.size)  # from stroke to stroke of one way
-    half = _t(dof) * math.sqrt(squares)
+    half = of_student(dof) * math.sqrt(squares)
     return [
         _Stroke(part, phase, _about(float(mean), half), phase.speed_m_s)
         for (part, phase, _), mean in zip(found, means, strict=True)
@@ -415,7 +383,7 @@ def _state(time_s: FloatArray, force: FloatArray) -> Literal["steady", "still dr
         changes = [(abs(float(w @ best)), float(w @ inverse @ w)) for w in (over, straight)]
         found.append((float(rest @ rest), changes, rest))
     squares, _, rest = min(found, key=lambda one: one[0])
-    variance, dof = _variance(rest, 3, _COSINES_OF_ALL)
+    variance, dof = variance_of_slow(rest, 3, _COSINES_OF_ALL)
     variance = max(variance, squares / n)
     near = [changes for other, changes, _ in found if other <= squares + 4.0 * variance]
     level = abs(float(force[int(late * n) :].mean()))
@@ -428,15 +396,6 @@ def _state(time_s: FloatArray, force: FloatArray) -> Literal["steady", "still dr
     if (small and not straight_drifts) or max(most, straight_most) < _STEADY_ANYWAY * level:
         return "steady"
     return "still drifts" if drifts else "cannot tell"
-
-
-def _variance(rest: FloatArray, first: int, count: int = _COSINES) -> tuple[float, int]:
-    """Variance of slow noise per sample by so many cosine coefficients of residuals, and their number."""
-    n = rest.size
-    cosines = min(count, n // 4)
-    index = np.arange(first, first + cosines)
-    waves = np.cos(np.pi * np.outer(index, (np.arange(n) + 0.5) / n)) * math.sqrt(2.0 / n)
-    return float(((waves @ rest) ** 2).mean()), cosines
 
 
 def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Interval, float] | None:
@@ -458,7 +417,7 @@ def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Inter
         squares = ((force - level[:, None] - change[:, None] * decay) ** 2).sum(axis=1)
         best = int(np.argmin(squares))
         rest = force - level[best] - change[best] * decay[best]
-        variance, dof = _variance(rest, 3, _COSINES_OF_ALL)
+        variance, dof = variance_of_slow(rest, 3, _COSINES_OF_ALL)
         bound = variance * float(f_distribution.ppf(0.95, 1, dof))
         near = np.flatnonzero(squares <= squares[best] + bound)
         low, high = float(taus[max(near[0] - 1, 0)]), float(taus[min(near[-1] + 1, taus.size - 1)])
@@ -466,7 +425,7 @@ def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Inter
         return None
     took = -math.log(_ARRIVED)
     left = max(abs(change[k]) * math.exp(-end / taus[k]) for k in near)
-    u = math.sqrt(variance / n) * _t(dof)
+    u = math.sqrt(variance / n) * of_student(dof)
     steady = float(level[best]), float(level[near].min()) - u, float(level[near].max()) + u
     return steady, (took * float(taus[best]), took * float(taus[near[0]]), took * float(taus[near[-1]])), float(left)
 
@@ -495,7 +454,7 @@ def _healing(part: Part, holds: Sequence[Reading], log_s: FloatArray, gain_N: Fl
     slope, x0, y0 = line(log_s, gain_N)
     rest = gain_N - y0 - slope * (log_s - x0)
     u = math.sqrt(float(rest @ rest) / (log_s.size - 2) / float(((log_s - x0) ** 2).sum()))
-    half = _t(log_s.size - 2) * u
+    half = of_student(log_s.size - 2) * u
     values: Mapping[str, Interval] = {"healing_N_per_decade": _about(slope, half)}
     return Reading(
         part.test.test_id, "healing", holds[0].start_s, holds[-1].end_s, normal_load_N=part.test.normal_load_N,

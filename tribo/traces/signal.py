@@ -18,6 +18,13 @@ from tribo.records import FloatArray, Trace
 
 BLOCKS = 16  # blocks a window is cut into; enough for a variogram, few enough to be longer than the correlation
 _SLOPE_U = 0.35  # standard uncertainty of a variogram's slope over BLOCKS blocks, as a share of level over mean lag
+_DEGREES = (1, 3, 5, 7, 9)  # of the polynomial that takes off the drift of a level: the first that leaves none
+_SLOWEST = 3  # coefficients after it in which drift that is left
+_STANDS_OUT = 2.3  # by this many times the variance of all
+_COSINES = 8  # coefficients after it that tell the noise of its mean
+_FEWEST_OF_LEVEL = 12  # samples from which on a mean has an interval
+_MEANS_OF_LEVEL = 600  # of a long level: thirty for each half wave of the fastest coefficient
+_NORMAL_95 = 1.96
 _MEDIAN_TO_SD = 1.4826  # of a normal distribution
 MINIMUM_SAMPLES = 20
 SPIKE_OVER_NOISE = 8.0
@@ -186,11 +193,71 @@ def _mean_within(estimate: float, u: float, most: float) -> float:
     return estimate + u * density / mass
 
 
+def mean_of_level(values: FloatArray) -> tuple[float, float, float]:
+    """Mean of a level and its 95 % interval under correlated noise and slow drift; an infinite one of too few samples.
+
+    Noise and drift are told apart by the cosine coefficients of the level (Phillips 2005, Econometric Theory 21, 116;
+    Mueller 2007, J. Econometrics 141, 1331), which split it by how slowly it changes. A low polynomial takes off the
+    slowest, which is drift of the level and no noise; the next ones give the variance of the mean, correlation counted,
+    with as many degrees of freedom. The interval is of the mean over these samples: how far a level drifts within them
+    is no uncertainty of it.
+    """
+    mean = float(values.mean())
+    if values.size < _FEWEST_OF_LEVEL:
+        return mean, -math.inf, math.inf
+    means = condense(values, values.size // _MEANS_OF_LEVEL)
+    n = means.size
+    powers = _polynomials(n)
+    for degree in _DEGREES:
+        rest = means - (means @ powers[:, : degree + 1]) @ powers[:, : degree + 1].T
+        variance, dof = variance_of_slow(rest, degree + 1, _COSINES)
+        slowest, _ = variance_of_slow(rest, degree + 1, _SLOWEST)
+        if slowest < _STANDS_OUT * variance or n < 4 * (degree + dof):
+            break
+    half = of_student(dof) * math.sqrt(variance / n)
+    return mean, mean - half, mean + half
+
+
+def variance_of_slow(rest: FloatArray, first: int, count: int) -> tuple[float, int]:
+    """Variance of slow noise per sample by ``count`` cosine coefficients from ``first`` on of residuals, and their
+    number, which is smaller where samples are few."""
+    cosines = min(count, rest.size // 4)
+    coefficients = _cosines(rest.size, first, cosines) @ rest
+    return float((coefficients**2).mean()), cosines
+
+
+@lru_cache(maxsize=64)
+def _polynomials(n: int) -> FloatArray:
+    """Orthonormal polynomials of the degrees 0, 1, 2, ... in the columns of (n, 10)."""
+    along = np.linspace(-1.0, 1.0, n)
+    return np.asarray(np.linalg.qr(np.polynomial.legendre.legvander(along, max(_DEGREES)))[0])
+
+
+@lru_cache(maxsize=64)
+def _cosines(n: int, first: int, count: int) -> FloatArray:
+    index = np.arange(first, first + count)
+    return np.asarray(np.cos(np.pi * np.outer(index, (np.arange(n) + 0.5) / n)) * math.sqrt(2.0 / n))
+
+
+@lru_cache(maxsize=1024)
+def of_student(dof: int) -> float:
+    """Half width of a 95 % interval in standard uncertainties."""
+    from scipy.stats import t
+
+    return float(t.ppf(0.975, dof))
+
+
 def steady(time_s: FloatArray, force: FloatArray) -> tuple[float, float, float, float]:
-    """Mean force over a window (N), its standard uncertainty from short-lived noise, correlation counted, the drift
-    (N/s) and the sample noise (N)."""
-    mean_u, _, noise = wander(force, float(time_s[-1] - time_s[0]))
-    return float(force.mean()), mean_u, line(time_s, force)[0], noise
+    """Mean force over a window (N), its standard uncertainty from noise, correlation counted, the drift (N/s) and the
+    sample noise (N).
+
+    The uncertainty is that whose 1.96-fold is the half width of the 95 % interval of :func:`mean_of_level`.
+    """
+    mean, low, high = mean_of_level(force)
+    mean_u = (high - low) / 2.0 / _NORMAL_95
+    if not math.isfinite(mean_u):
+        mean_u = float(force.std(ddof=1)) / math.sqrt(force.size) if force.size > 1 else math.nan
+    return mean, mean_u, line(time_s, force)[0], sample_noise(force)
 
 
 @dataclass(frozen=True)
@@ -466,7 +533,9 @@ def odd_signal(trace: Trace) -> list[Problem]:
     against the force. ``repeated_samples``: a stretch of samples is there twice, or every sample.
     """
     force = np.asarray(trace.force_N, float)
-    found = [_clipped(force) or _toggling(force), _coarse(force), _repeated(force)]
+    noise = _block_noise(force)
+    typical, large = (float(value) for value in np.quantile(noise, (0.5, 0.8)))
+    found = [_clipped(force, typical) or _toggling(force, large), _coarse(force), _repeated(force, typical)]
     file = trace.file or None
     return [
         Problem(kind, what, file, trace.first_row + at, "force", size)
@@ -484,11 +553,22 @@ def _resolution(force: FloatArray) -> float:
     return float(steps.min()) if steps.size else 0.0
 
 
-def _block_noise(force: FloatArray, share: float = 0.5) -> float:
-    """Noise of a sample, exceeded in the rest of a share of blocks: not that of a still stretch, nor of a slip."""
-    blocks = np.array_split(force, max(1, min(force.size // 16, _MOST_BLOCKS)))
-    noise = [sample_noise(block) for block in blocks if block.size >= MINIMUM_SAMPLES // 2]
-    return float(np.quantile(noise, share)) if noise else 0.0
+def _block_noise(force: FloatArray) -> FloatArray:
+    """Noise of a sample in each block of a record (blocks,), each as :func:`sample_noise` tells it; 0 of few samples.
+
+    A quantile of it is not that of a still stretch, nor of a slip.
+    """
+    blocks = max(1, min(force.size // 16, _MOST_BLOCKS))
+    size, larger = divmod(force.size, blocks)
+    if size < MINIMUM_SAMPLES // 2:
+        return np.zeros(1)
+    at = larger * (size + 1)
+    found = []
+    for part in (force[:at].reshape(larger, size + 1), force[at:].reshape(blocks - larger, size)):
+        second = np.abs(part[:, 2:] - 2.0 * part[:, 1:-1] + part[:, :-2])
+        typical = _MEDIAN_TO_SD * np.median(second, axis=1)
+        found.append(np.where(typical > 0.0, typical, np.sqrt((second**2).mean(axis=1))) / math.sqrt(6.0))
+    return np.concatenate(found)
 
 
 def _narrowest(
@@ -516,8 +596,8 @@ def _narrowest(
     return None if best is None else best[1:]
 
 
-def _clipped(force: FloatArray) -> Oddness | None:
-    noise, resolution = _block_noise(force), _resolution(force)
+def _clipped(force: FloatArray, noise: float) -> Oddness | None:
+    resolution = _resolution(force)
     if not noise > 2.0 * resolution:
         return None
     top = float(force.max())
@@ -536,8 +616,8 @@ def _clipped(force: FloatArray) -> Oddness | None:
     return "clipped", what, at, size
 
 
-def _toggling(force: FloatArray) -> Oddness | None:
-    noise, resolution = _block_noise(force, 0.8), _resolution(force)
+def _toggling(force: FloatArray, noise: float) -> Oddness | None:
+    resolution = _resolution(force)
     if not noise > 2.0 * resolution:
         return None
     above = float(force.min()) + _AT_ZERO * float(np.ptp(force))
@@ -562,8 +642,7 @@ def _coarse(force: FloatArray) -> Oddness | None:
     return "coarse", what, 0, f"friction forces are uncertain by up to {step / 2:.2g} N"
 
 
-def _repeated(force: FloatArray) -> Oddness | None:
-    noise = _block_noise(force)
+def _repeated(force: FloatArray, noise: float) -> Oddness | None:
     if force.size < 4 * _REPEATED_BLOCK or not noise > 2.0 * _resolution(force):
         return None
     pairs = force[1:] == force[:-1]
