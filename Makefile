@@ -22,14 +22,13 @@ unexport PYTHONDONTWRITEBYTECODE  # without bytecode in .venv every process comp
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) -e .
+	$(PIP) uv
+	$(UV) -e . || $(PIP) -e .
 	touch $@
 
-$(VENV)/.dev: pyproject.toml constraints.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) uv
+$(VENV)/.dev: $(VENV)/.run
 	$(UV) -e '.[dev]' || $(PIP) -e '.[dev]'
-	touch $(VENV)/.run $@
+	touch $@
 
 demo: $(VENV)/.run
 	$(BIN)/tribo demo -o out/demo

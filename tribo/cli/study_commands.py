@@ -290,7 +290,6 @@ def _run_stages(
     from tribo.campaign import open_campaign
     from tribo.report import write_until
     from tribo.report.write import Drawing
-    from tribo.wording.card import card_of
 
     stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out / KEPT, **options)
@@ -300,8 +299,11 @@ def _run_stages(
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
         drawing = Drawing(progress, chosen.jobs, chosen.kept)
-        verdict = found.verdict if found else None
-        card = card_of(study, verdict) if until == "report" else None
+        verdict, card = found.verdict if found else None, None
+        if until == "report":
+            from tribo.wording.card import card_of
+
+            card = card_of(study, verdict)
         write_until(study, out, until, drawing, provenance_of_run(study, path, chosen), found, card)
     return (conclude or _conclude)(console, study, out, verdict, card)
 
