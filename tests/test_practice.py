@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tribo import stages
 from tribo.campaign import load_campaign
@@ -15,6 +16,7 @@ from tribo.display import exact_text
 Practice = Callable[[str], Path]
 
 
+@pytest.mark.slow
 def test_every_spoiled_test_is_named_with_its_damage_and_healthy_ones_are_read_to_the_same_bits(
     practice: Practice, shared: Path
 ) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from support import first_quick
 
 from tribo.campaign import load_campaign
 from tribo.diagnostics import examine
@@ -29,7 +30,7 @@ def verdict_on(folder: Path, seed: int, *effects: tuple[str, float], design: Des
     return examine(ingest(campaign), seed=seed, replicates=(50, 30)).verdict
 
 
-@pytest.mark.parametrize(("seed", "design"), [(201, QUICK), (202, ALL)])
+@pytest.mark.parametrize(("seed", "design"), first_quick([(201, QUICK), (202, ALL)]))
 def test_a_campaign_without_an_effect_is_said_to_have_none(tmp_path: Path, seed: int, design: Design) -> None:
     v = verdict_on(tmp_path, seed, design=design)
     assert v.verdict == "no_misfit"
@@ -40,7 +41,9 @@ def test_a_campaign_without_an_effect_is_said_to_have_none(tmp_path: Path, seed:
 
 @pytest.mark.parametrize(
     ("effect", "design"),
-    [("run_in", QUICK), ("contact_area_loss", LOADS), ("velocity_dependence", LADDER), ("load_cell_offset", QUICK)],
+    first_quick(
+        [("run_in", QUICK), ("contact_area_loss", LOADS), ("velocity_dependence", LADDER), ("load_cell_offset", QUICK)]
+    ),
 )
 def test_a_clear_effect_is_named(tmp_path: Path, effect: str, design: Design) -> None:
     v = verdict_on(tmp_path, 211, (effect, min(1.5, LARGEST.get(effect, 1.5))), design=design)

@@ -47,6 +47,7 @@ def beside() -> Diagnosis:
     return examine(made(with_running_in, seed=4), replicates=FEW)
 
 
+@pytest.mark.slow
 def test_three_causes_at_once_are_all_named() -> None:
     v = examine(made(three_effects, seed=1), replicates=FEW).verdict
     assert {c.mechanism for c in v.causes} >= {"tilt", "run_in", "temperature"}

@@ -36,6 +36,7 @@ def failures(bench: Bench, kinds: list[str], per_kind: int = 1) -> list[tuple[st
     return found
 
 
+@pytest.mark.slow
 def test_ingest_withstands_a_fault_at_each_kind_of_file_operation(tmp_path: Path) -> None:
     place = write_inputs(tmp_path.resolve() / "watched")
     bench = warm(place, Command("ingest", ("ingest", str(place.campaign), "-o", str(place.out), "--jobs", "1")))

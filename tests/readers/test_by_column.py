@@ -183,6 +183,7 @@ def test_strokes_of_the_micrometre_rig_have_half_the_difference_of_both_directio
     assert found == pytest.approx(by_column, rel=SLIDING)
 
 
+@pytest.mark.slow
 def test_the_damper_has_the_mean_force_of_its_windows() -> None:
     for file in files("friction-damper", "*.json"):
         rows = np.array(json.loads(file.read_text())["data"], float)
@@ -198,6 +199,7 @@ def test_the_damper_has_the_mean_force_of_its_windows() -> None:
             assert pull.sliding_N == pytest.approx(by_column, rel=SLIDING), file.name
 
 
+@pytest.mark.slow
 def test_elastomers_have_the_coefficient_of_each_row_times_its_load(tmp_path: Path) -> None:
     (file,) = files("elastomer-per-cycle", "*.csv")
     with file.open(encoding="utf-8-sig", newline="") as rows:

@@ -68,6 +68,7 @@ def test_an_inspection_contrasts_of_the_beginning_and_says_so(tmp_path: Path) ->
     assert seen.tables[0].rows < ROWS / 4
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_pieces")
 def test_a_pull_is_read_off_a_long_record_in_bounded_memory(tmp_path: Path) -> None:
     assert bytes_per_row(lambda path: read_pull(read_export(path)), tmp_path) < 120

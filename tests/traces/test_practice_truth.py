@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from support import first_quick
 from support.campaigns import DIALECTS, MadeCampaign
 
 from tribo import read_pull
@@ -52,14 +53,14 @@ def made_pulls(made: Callable[[str], MadeCampaign]) -> Callable[[str], dict[str,
     return lru_cache(lambda dialect: pulls_of(made(dialect).folder))
 
 
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("dialect", first_quick(DIALECTS))
 def test_pulls_agree_with_the_forces_of_the_virtual_tribometer(
     dialect: str, made: Callable[[str], MadeCampaign], made_pulls: Callable[[str], dict[str, Pull]]
 ) -> None:
     assert disagreements(made_pulls(dialect), made(dialect).truth) == []
 
 
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("dialect", first_quick(DIALECTS))
 def test_no_healthy_trace_of_the_virtual_tribometer_raises_an_alarm(
     dialect: str, made_pulls: Callable[[str], dict[str, Pull]]
 ) -> None:
