@@ -46,7 +46,7 @@ test: lint
 	$(MAKE) -j 2 types pytest  # at once: mypy takes one process
 
 $(VENV)/.docs: $(VENV)/.run
-	$(PIP) -e '.[docs]'
+	$(UV) -e '.[docs]' || $(PIP) -e '.[docs]'
 	touch $@
 
 docs: $(VENV)/.docs
