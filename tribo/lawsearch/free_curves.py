@@ -1,4 +1,5 @@
-"""Laws as curves: how friction follows a column with no formula in mind, by a Gaussian process, with its band.
+"""Laws as curves and surfaces: how friction follows one column or two with no formula in mind, by a Gaussian process,
+with its band.
 
 A curve is held at knots along the column. It is uncertain by what the campaign leaves open, averaged over how large,
 how smooth and how fast it may be (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and
@@ -7,17 +8,30 @@ how smooth and how fast it may be (Rasmussen and Williams, Gaussian Processes fo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import gain_on_groups
-from tribo.lawsearch.grammar import MOST_VALUES, PRESSURES, WIDE, Shape, WrittenLaw, recorded_values
+from tribo.diagnostics.gaps import enough_recorded
+from tribo.lawsearch.grammar import (
+    MOST_VALUES,
+    PRESSURES,
+    UNITS,
+    WIDE,
+    Shape,
+    WrittenLaw,
+    column_values,
+    recorded_values,
+)
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
 KNOTS = 25
+ALONG = 13  # knots of a surface along each column
 LENGTHS = (0.07, 0.15, 0.3, 0.6)  # over which a curve changes, in shares of the range of the column
 SIZES = np.geomspace(0.005, 0.5, 9)  # standard deviation of a curve, in ln T
 FREE = 3.0  # standard deviation of the amplitude of a formula
@@ -40,6 +54,34 @@ def curve_of(column: str, c: Conditions) -> Shape | None:
     return Shape("curve", column, low, high, values=(low, *places[1:-1], high), heights=(0.0,) * KNOTS)
 
 
+def knots_of(column: str, c: Conditions) -> Shape | None:
+    """The knots of a surface along a column of numbers: its values where it has few, else evenly spaced, or in the
+    logarithm where the column spans much; None where a column does not vary, or where the flat law follows it."""
+    if column in PRESSURES or not (column in UNITS or np.isfinite(column_values(c, column)).any()):
+        return None
+    x = recorded_values(c, column)
+    values = np.unique(x)
+    if len(values) < 2 or not enough_recorded(len(x), len(c.sample)):
+        return None
+    low, high = float(values[0]), float(values[-1])
+    spaced = np.geomspace if low > 0 and high / low > WIDE else np.linspace
+    places = values if len(values) <= ALONG else spaced(low, high, ALONG)
+    return Shape("surface", column, low, high, values=(low, *(float(p) for p in places[1:-1]), high))
+
+
+def kernels(shape: Shape) -> list[FloatArray]:
+    """Covariances between the knots of a column, smooth and rough, for each of the lengths."""
+    at = np.array(shape.values, float)
+    place = np.log(at) if shape.low > 0 and shape.high / shape.low > WIDE else at
+    place = (place - place[0]) / (place[-1] - place[0])
+    apart = np.abs(place[:, None] - place)
+    found = []
+    for length in LENGTHS:
+        near = apart / length
+        found += [np.exp(-0.5 * near**2), (1.0 + np.sqrt(3.0) * near) * np.exp(-np.sqrt(3.0) * near)]
+    return found
+
+
 @dataclass(frozen=True)
 class FreeCurve:
     """A curve in one scope of laws, known from a campaign.
@@ -59,28 +101,38 @@ class FreeCurve:
     @property
     def heights(self) -> FloatArray:
         """ln T at the knots where the law acts fully, about a mean of zero over its tests, without the formula."""
-        return self.value[-KNOTS:]
+        return self.value[-len(self.prior) :]
 
 
-def at_knots(shape: Shape, c: Conditions) -> FloatArray:
-    """The courses (n, knots) that a curve is made of, each one at its knot and zero at the others."""
-    each = np.eye(KNOTS)
-    return np.column_stack([replace(shape, heights=tuple(row)).of(c)[:, 0] for row in each])
+def at_knots(shapes: Sequence[Shape], c: Conditions) -> FloatArray:
+    """The courses (n, knots) that a curve or a surface is made of, each one at its knot and zero at the others."""
+    first, *second = (replace(shape, kind="surface", heights=()).of(c) for shape in shapes)
+    for other in second:
+        first = (first[:, :, None] * other[:, None, :]).reshape(len(first), -1)
+    return first
+
+
+def likely(shapes: Sequence[Shape]) -> list[FloatArray]:
+    """Covariances between the knots of a curve or a surface, of a standard deviation of one along each column."""
+    each = [kernels(shape) for shape in shapes]
+    if len(each) == 1:
+        return each[0]
+    alike = (pair for k in (0, 1) for pair in product(each[0][2 + k :: 2], each[1][2 + k :: 2]))
+    return [np.kron(1.0 + one, 1.0 + other) - 1.0 for one, other in alike]
 
 
 def fitted_curve(
-    without: ModelFit, scope: tuple[WrittenLaw, FloatArray], shape: Shape, informed: float, formula: Shape | None = None
+    without: ModelFit, scope: tuple[WrittenLaw, FloatArray], informed: float, formula: Shape | None = None
 ) -> FreeCurve:
-    """The curve that a campaign tells of, ``without`` being its fit without the law.
+    """The curve or surface that a campaign tells of, ``without`` being its fit without the law.
 
     Parameters
     ----------
     without : ModelFit
         With the noise at which it is told, and the residual.
     scope : (WrittenLaw, array (n, 2))
-        What it acts on, and by how much it changes ln T of every test there.
-    shape : Shape
-        From :func:`curve_of`.
+        The law, with the shape of :func:`curve_of` or two of :func:`knots_of`, and by how much it changes ln T of
+        every test.
     informed : float
         Of the information in the weighted normal equations, what a pull really tells.
     formula : Shape, optional
@@ -88,7 +140,7 @@ def fitted_curve(
     """
     law, effects = scope
     c = without.setup.observations.conditions
-    courses = at_knots(shape, c)
+    courses = at_knots(law.shapes, c)
     acts = np.abs(law.weight(c))
     courses = courses - acts @ courses / acts.sum()
     if formula is not None:
@@ -96,16 +148,13 @@ def fitted_curve(
     columns = courses[:, None, :] * effects[:, :, None]
     rows, residual = without.cleared(columns)
     information, pull = rows.T @ rows, rows.T @ residual
-    place = np.linspace(0.0, 1.0, KNOTS)
-    apart = np.abs(place[:, None] - place)
     found = []
-    for length in LENGTHS:
-        near = apart / length
-        for kernel in (np.exp(-0.5 * near**2), (1.0 + np.sqrt(3.0) * near) * np.exp(-np.sqrt(3.0) * near)):
-            variance, directions = np.linalg.eigh(kernel)
-            kept = variance > FLAT_BELOW * variance[-1]
-            root = directions[:, kept] * np.sqrt(variance[kept])
-            found += [_member(information, pull, size * root, informed) for size in SIZES]
+    for kernel in likely(law.shapes):
+        variance, directions = np.linalg.eigh(kernel)
+        kept = variance > FLAT_BELOW * variance[-1]
+        root = directions[:, kept] * np.sqrt(variance[kept])
+        sizes = SIZES if len(law.shapes) == 1 else SIZES[2::2]
+        found += [_member(information, pull, size * root, informed) for size in sizes]
     evidence = np.array([member[0] for member in found])
     share = np.exp(evidence - evidence.max())
     share = share / share.sum()
@@ -113,8 +162,8 @@ def fitted_curve(
     spread = sum(
         w * (member[2] + np.outer(member[1] - value, member[1] - value)) for w, member in zip(share, found, strict=True)
     )
-    likely = sum(w * member[3] @ member[3].T for w, member in zip(share, found, strict=True))
-    variance, directions = np.linalg.eigh(likely)
+    prior = sum(w * member[3] @ member[3].T for w, member in zip(share, found, strict=True))
+    variance, directions = np.linalg.eigh(prior)
     kept = variance > FLAT_BELOW * variance[-1]
     prior = directions[:, kept] * np.sqrt(variance[kept])
     mean = float(evidence.max() + np.log(np.mean(np.exp(evidence - evidence.max()))))

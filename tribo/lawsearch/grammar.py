@@ -46,7 +46,8 @@ class Shape:
     ``place`` to ``place`` + ``width``; ``wave`` is sin and cos of the period ``width``; ``log optimum`` is a parabola
     of the logarithm; ``level`` is 1 where a column of names has the value ``level``, or one of numbers the value
     ``place``; ``levels`` is 1 at the second of the ``values`` of a column, 1 at the third, and so on: a column each;
-    ``curve`` has the ``heights`` at the ``values`` of a column, and runs straight from one to the next.
+    ``curve`` has the ``heights`` at the ``values`` of a column, and runs straight from one to the next; ``surface`` is
+    one of two columns: the second holds the ``heights`` at every pair of their ``values``, the first column's in rows.
     """
 
     kind: str
@@ -65,7 +66,7 @@ class Shape:
         return self.low if math.isnan(self.place) else self.place
 
     def of(self, c: Conditions) -> FloatArray:
-        """Values of shape (n, 1), (n, 2) of a wave, (n, values - 1) of levels.
+        """Values of shape (n, 1), (n, 2) of a wave, (n, values - 1) of levels, (n, values) of one side of a surface.
 
         Where the column has no value, it is what is expected of the shape given what is known of the value, or the mean
         over the recorded ones where nothing is.
@@ -99,6 +100,8 @@ class Shape:
             return (-((np.log(np.maximum(x, 1e-300) / self.place) / half) ** 2))[:, None]
         if self.kind == "curve":
             return np.interp(x, np.array(self.values, float), self.heights)[:, None]
+        if self.kind == "surface":
+            return hats(x, np.array(self.values, float))
         if self.kind == "linear":
             return ((x - self.zero) / (self.high - self.low))[:, None]
         if self.kind == "log":
@@ -159,6 +162,10 @@ class WrittenLaw:
     def course(self, c: Conditions) -> FloatArray:
         """The product of its shapes, (n, d)."""
         found = self.shapes[0].of(c)
+        if self.shapes[0].kind == "surface":
+            second = self.shapes[1]
+            heights = np.reshape(second.heights, (found.shape[1], -1))
+            return np.einsum("ni,nj,ij->n", found, second.of(c), heights)[:, None]
         for shape in self.shapes[1:]:
             found = found * shape.of(c)
         return found
@@ -223,6 +230,8 @@ class WrittenLaw:
         if self.shapes[0].kind == "levels":
             each = zip(AMPLITUDES, self.shapes[0].at_each[1:], strict=False)
             return f"{self.acts_on} * exp({' + '.join(f'{name} {_formula(s)}{weight}' for name, s in each)})"
+        if self.shapes[0].kind == "surface":
+            return f"{self.acts_on} * exp({a} surface({', '.join(self.columns)}){weight})"
         inner = " * ".join(_formula(s) for s in self.shapes)
         return f"{self.acts_on} * exp({a} {inner}{weight})"
 
@@ -255,6 +264,11 @@ def _formula(s: Shape) -> str:
         half = max(math.log(s.high / s.place), math.log(s.place / s.low))
         return f"(-(ln({x} / {s.place:.4g}) / {half:.4g})^2)"
     return f"[{x} = {s.level or f'{s.place:.4g}'}]"
+
+
+def hats(x: FloatArray, knots: FloatArray) -> FloatArray:
+    """Of numbers x (n,) the weights (n, knots) of the knots between which they lie, NaN where x is."""
+    return np.column_stack([np.interp(x, knots, one) for one in np.eye(len(knots))])
 
 
 def column_values(c: Conditions, name: str) -> FloatArray:

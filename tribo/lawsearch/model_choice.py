@@ -7,7 +7,7 @@ way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
@@ -22,7 +22,8 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import estimates, gain, informed_share
 from tribo.diagnostics.model import Acting, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
-from tribo.lawsearch.free_curves import KNOTS, FreeCurve, better_left_out, curve_of, fitted_curve
+from tribo.lawsearch.free_curves import FreeCurve, at_knots, better_left_out, curve_of, fitted_curve, knots_of
+from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, free_columns, free_scopes, likeliest
 from tribo.lawsearch.grammar import (
     BOTH,
     LOAD_TERM,
@@ -35,6 +36,7 @@ from tribo.lawsearch.grammar import (
     corrects_a_pattern,
     fine_products,
     fine_shapes,
+    recorded_values,
     refined_shapes,
     shapes_of,
 )
@@ -49,6 +51,7 @@ IN_REACH = 8.0  # below the best on the coarse grid, within which a form is look
 LOOKED_AT = 40  # forms at most on the fine grid
 MOST_IN_BAND = 8  # forms whose changes make up a band
 TOLD = 7  # places along a curve at which a law is told
+LOW_TO_HIGH = (0.1, 0.5, 0.9)  # quantiles of each column at which a surface is told
 WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
 CONTRADICTED = 0.05  # chance of a formula that fits the values of a column worse, if it is true
 PLACED = ("step", "soft step", "ramp", "optimum", "log optimum", "hump", "window")  # kinds with a place
@@ -129,7 +132,7 @@ class Background:
         """The curve in one scope, alone or beside a formula."""
         without = replace(self.without, residual=self.residual)
         law = replace(scope, shapes=(shape,))
-        return fitted_curve(without, (law, self.effects(scope)[0]), shape, self.informed, formula)
+        return fitted_curve(without, (law, self.effects(scope)[0]), self.informed, formula)
 
     def effects(self, *scopes: WrittenLaw) -> FloatArray:
         return effects_of(scopes, self.conditions, self.terms)
@@ -180,6 +183,8 @@ def choose_form(
         Of the resamples behind the error of the gain.
     """
     background, forms = _best_forms(model, grammar, first)
+    if (surface := _likelier_surface(model, background, forms[0].best, grammar.without)) is not None:
+        return _by_curve(model, surface, p, rng)
     if levels := levels_of_law(forms[0].best, background.conditions):
         return _by_levels(model, replace(forms[0].scope, shapes=(levels,)), p, rng)
     curve = _likeliest_curve(background, forms, grammar)
@@ -200,6 +205,75 @@ def choose_form(
     )  # fmt: skip
 
 
+def choose_free(
+    model: ModelFit, search: FreeSearch, without: Collection[str], p: float, rng: np.random.Generator
+) -> FoundLaw:
+    """A law that no formula shows, found by a ``search`` for curves and surfaces: a surface, or what is best of one
+    column."""
+    c = model.setup.observations.conditions
+    apart, columns, scope = likeliest(search, model.residual, 2)
+    alone, (column, *_), _ = likeliest(search, model.residual, 1)
+    if apart > alone:
+        first = _surface(replace(scope, shapes=_knots(columns, c)), model)
+        surface = _settled_surface(model, Background(model, _with_heights(first)), without)
+        if surface is not None:
+            return _by_curve(model, surface, p, rng)
+    grammar = Grammar(model, without, [each for each in shapes_of(c) if {s.column for s in each[0]} == {column}])
+    net = grammar.net(Projection(model, model.residual[None]))[0]
+    return choose_form(model, grammar, grammar.law(int(np.argmax(net))), p, rng)
+
+
+def _knots(columns: Sequence[str], c: Conditions) -> tuple[Shape, ...]:
+    return tuple(shape for name in columns if (shape := knots_of(name, c)) is not None)
+
+
+def _surface(law: WrittenLaw, without: ModelFit) -> FreeCurve:
+    """The surface of a law without heights that a fit without it tells of."""
+    effects = effects_of([law], without.setup.observations.conditions, terms_of(without))[0]
+    return fitted_curve(without, (law, effects), informed_share(without.noise))
+
+
+def _with_heights(curve: FreeCurve) -> WrittenLaw:
+    """The law of a curve or surface with its heights, which span one."""
+    *first, last = curve.law.shapes
+    heights = tuple(float(h) for h in curve.heights / max(float(np.ptp(curve.heights)), 1e-12))
+    return replace(curve.law, shapes=(*first, replace(last, heights=heights)))
+
+
+def _likelier_surface(
+    model: ModelFit, at: Background, law: WrittenLaw, without: Collection[str]
+) -> FreeCurve | None:
+    """A surface of two columns where a campaign speaks for it beyond a law of one, or of two as a formula, and where it
+    predicts tests that were left out better; None elsewhere."""
+    sets = free_columns(at.conditions, without)
+    if set(law.columns) & OF_SERIES or not any(len(each) > 1 for each in sets):
+        return None
+    search = FreeSearch(replace(at.without, residual=at.residual), *free_scopes(at.conditions), sets)
+    apart, columns, scope = likeliest(search, at.residual, 2)
+    if len(law.columns) == 1 and apart < likeliest(search, at.residual, 1)[0] + CLOSE:
+        return None
+    first = _surface(replace(scope, shapes=_knots(columns, at.conditions)), replace(at.without, residual=at.residual))
+    surface = _settled_surface(model, Background(model, _with_heights(first)), without)
+    return surface if surface is not None and better_left_out(model, at.after, surface) else None
+
+
+def _settled_surface(model: ModelFit, at: Background, without: Collection[str]) -> FreeCurve | None:
+    """The surface that is likeliest at the noise that it leaves itself; None where a curve of one column is as likely
+    there."""
+    sets = free_columns(at.conditions, without)
+    for _ in range(ROUNDS):
+        left = replace(at.without, residual=at.residual)
+        search = FreeSearch(left, *free_scopes(at.conditions), sets)
+        apart, columns, scope = likeliest(search, at.residual, 2)
+        if apart < likeliest(search, at.residual, 1)[0] + CLOSE:
+            return None
+        surface = _surface(replace(scope, shapes=_knots(columns, at.conditions)), left)
+        if (columns, scope) == (at.law.columns, replace(at.law, shapes=())):
+            break
+        at = Background(model, _with_heights(surface))
+    return surface
+
+
 def _likeliest_curve(at: Background, forms: Sequence[Form], grammar: Grammar) -> FreeCurve | None:
     """The likeliest curve, of the columns, regimes and samples of the forms in reach; None where the best form is a law
     of two columns, or of one that has no curves."""
@@ -217,10 +291,7 @@ def _likeliest_curve(at: Background, forms: Sequence[Form], grammar: Grammar) ->
 
 def _by_curve(model: ModelFit, curve: FreeCurve, p: float, rng: np.random.Generator) -> FoundLaw:
     """A law that no formula tells as well: its course with a band, and what friction does along it."""
-    heights = curve.heights
-    low, high = int(heights.argmin()), int(heights.argmax())
-    shape = replace(curve.law.shapes[0], heights=tuple(float(h) for h in heights / np.ptp(heights)))
-    at = Background(model, replace(curve.law, shapes=(shape,)))
+    at, heights = Background(model, _with_heights(curve)), curve.heights
     after = at.after
     parameters = estimates(after, len(after.acting) - 1)
     last = after.columns.parameters - 1
@@ -228,18 +299,38 @@ def _by_curve(model: ModelFit, curve: FreeCurve, p: float, rng: np.random.Genera
     wider = max((a.high - a.low) / (2.0 * NORMAL_90) / sd, 1.0)
     full = float(np.abs(curve.law.weight(at.conditions)).max())
     covariance = curve.covariance * (wider * full) ** 2
-    apart = np.zeros(KNOTS)
-    apart[[high, low]] = 1.0, -1.0
+    there = at_knots(curve.law.shapes, at.conditions)[at.law.weight(at.conditions) != 0]
+    apart = there[int(np.argmax(there @ heights))] - there[int(np.argmin(there @ heights))]
     (effect,) = _percents(np.array([apart @ heights * full]), (apart @ covariance @ apart).reshape(1, 1))
-    told = np.linspace(0, KNOTS - 1, TOLD).round().astype(int)
-    each = _percents(heights[told] * full, covariance[np.ix_(told, told)])
-    levels = {_as_read(shape.column, shape.values[k]): e for k, e in zip(told, each, strict=True)}
+    told = _told_at(curve.law.shapes, at.conditions)
+    each = _percents(heights[list(told)] * full, covariance[np.ix_(list(told), list(told))])
+    levels = dict(zip(told.values(), each, strict=True))
     mean, spread = _beyond_patterns(at, curve)
     half = NORMAL_90 * wider * np.sqrt(spread)
     return FoundLaw(
         at.law, parameters, (effect.value, effect.low, effect.high), p, gain(model, after, rng), (), after,
         np.stack([mean, mean - half, mean + half]), levels,
     )  # fmt: skip
+
+
+def _told_at(shapes: Sequence[Shape], c: Conditions) -> dict[int, str]:
+    """Knots of a curve or surface at which it is told, each with the values of its columns as they are read: along a
+    curve evenly; of a surface low, in the middle and high along both columns."""
+    if len(shapes) == 1:
+        places = np.linspace(0, len(shapes[0].values) - 1, TOLD).round().astype(int).tolist()
+        return {k: _as_read(shapes[0].column, shapes[0].values[k]) for k in places}
+    along = []
+    for shape in shapes:
+        values = np.array(shape.values, float)
+        near = np.quantile(recorded_values(c, shape.column), LOW_TO_HIGH)
+        along.append(np.unique(np.abs(values[:, None] - near).argmin(axis=0)).tolist())
+    units = [COLUMNS[s.column].unit if s.column in COLUMNS else "" for s in shapes]
+    named = [
+        {k: f"{_as_read(shape.column, shape.values[k])} {unit}".rstrip() for k in places}
+        for shape, places, unit in zip(shapes, along, units, strict=True)
+    ]
+    across = len(shapes[1].values)
+    return {i * across + j: f"{one} and {other}" for i, one in named[0].items() for j, other in named[1].items()}
 
 
 def _beyond_patterns(at: Background, curve: FreeCurve) -> tuple[FloatArray, FloatArray]:

@@ -243,6 +243,11 @@ class Grammar:
         Columns that are left out.
     shapes : list of (shapes, cost), optional
         These alone in place of all that the campaign allows.
+
+    Attributes
+    ----------
+    without : collection of str
+        Columns that are left out.
     """
 
     def __init__(
@@ -251,7 +256,7 @@ class Grammar:
         without: Collection[str] = (),
         shapes: Sequence[tuple[tuple[Shape, ...], float]] | None = None,
     ) -> None:
-        c = model.setup.observations.conditions
+        c, self.without = model.setup.observations.conditions, without
         self.courses = Courses(shapes_of(c, without) if shapes is None else shapes, c)
         self.scopes, self.scope_cost = scopes_of(c)
         self.effects = effects_of(self.scopes, c, terms_of(model))

@@ -12,8 +12,9 @@ from tribo.diagnostics.contrasts import allowed_wrong_form, decided, share_beyon
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.inference import gain_on_sessions
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
+from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes
 from tribo.lawsearch.grammar import WrittenLaw
-from tribo.lawsearch.model_choice import FoundLaw, choose_form
+from tribo.lawsearch.model_choice import FoundLaw, choose_form, choose_free
 from tribo.lawsearch.scoring import Grammar, Index, Projection
 from tribo.records import FloatArray
 
@@ -85,14 +86,21 @@ def discover_laws(
         scored = _scored(model, grammar)
         best, _, strongest = scored[0]
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
+        free = _worth_counting(model, used)
         # after Wilks, the chance that a law gains so much if it is the only one tried: less than that of the best of
         # all, so that a law which fails here needs no simulated campaigns
-        if float(chdtrc(1, 2.0 * max(strongest, 0.0))) >= level:
+        strongest = strongest if float(chdtrc(1, 2.0 * max(strongest, 0.0))) < level else -np.inf
+        seen = (strongest, float(free.evidence(model.residual[None]).max()) if free is not None else -np.inf)
+        if max(seen) == -np.inf:
             break
-        p = share_beyond(_best_by_chance(model, grammar, strongest, (replicates, rng), progress), strongest)
-        if p >= level:
+        chance = _best_by_chance(model, (grammar, free), seen, (replicates, rng), progress)
+        p, p_free = (share_beyond(each, value) for each, value in zip(chance, seen, strict=True))
+        if min(p, p_free) >= level:
             break
-        law = choose_form(model, grammar, best, p, rng)
+        law = (
+            choose_form(model, grammar, best, p, rng) if free is None or p < level
+            else choose_free(model, free, used, p_free, rng)
+        )  # fmt: skip
         if set(law.law.columns) <= TIMES and not _predicts_sessions(model, law.model):
             break
         found.append(law)
@@ -117,31 +125,49 @@ def _scored(model: ModelFit, grammar: Grammar) -> list[tuple[WrittenLaw, float, 
     return sorted(((grammar.law(i), float(g), float(n)) for i, g, n in each), key=lambda scored: -scored[2])
 
 
+def _worth_counting(model: ModelFit, without: Collection[str]) -> FreeSearch | None:
+    """The search for curves and surfaces where one of them, on all samples or on one, is as likely as none: elsewhere
+    chance need not be counted."""
+    c = model.setup.observations.conditions
+    columns = free_columns(c, without)
+    if not columns or FreeSearch(model, *free_scopes(c, few=True), columns).evidence(model.residual[None]).max() < 0.0:
+        return None
+    return FreeSearch(model, *free_scopes(c), columns)
+
+
 def _best_by_chance(
     model: ModelFit,
-    grammar: Grammar,
-    strongest: float,
+    searches: tuple[Grammar, FreeSearch | None],
+    seen: tuple[float, float],
     draws: tuple[int, np.random.Generator],
     progress: Progress | None,
-) -> FloatArray:
-    """The best net score in each of the campaigns that the model makes itself, until they decide on ``strongest``.
+) -> tuple[FloatArray, FloatArray]:
+    """The best net score of a formula, and of a curve or surface, in each of the campaigns that the model makes itself,
+    until they decide on those that were ``seen``; what was not seen (minus infinity) is not scored.
 
-    All laws are scored at the fitted noise, and the best of them with the noise estimated in each campaign.
+    All formulas are scored at the fitted noise, and the best of them with the noise estimated in each campaign.
     """
-    replicates, rng = draws
-    chance: list[float] = []
-    while len(chance) < replicates:
+    (replicates, rng), (grammar, free) = draws, searches
+    formulas: list[float] = []
+    curves: list[float] = []
+    made = 0
+    while made < replicates:
         drawn = drawn_residuals(model, rng, CAMPAIGNS_AT_ONCE)
-        made = refit(model, drawn)
-        nets = grammar.net(Projection(model, drawn.transpose(0, 2, 1)))
-        for k, net in enumerate(nets):
-            index = best_of(net, RESCORED)
-            chance.append(float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max()))
+        made += CAMPAIGNS_AT_ONCE
+        if seen[0] > -np.inf:
+            again = refit(model, drawn)
+            for k, net in enumerate(grammar.net(Projection(model, drawn.transpose(0, 2, 1)))):
+                index = best_of(net, RESCORED)
+                formulas.append(float((grammar.gains(again.one(k), index)[0] - grammar.cost(index)).max()))
+        if free is not None:
+            curves += free.evidence(drawn.transpose(0, 2, 1)).max(axis=(1, 2)).tolist()
         if progress is not None:
-            progress("discover", len(chance), replicates)
-        if decided(np.array(chance), strongest, CAMPAIGNS_AT_ONCE):
+            progress("discover", made, replicates)
+        each = [(np.array(chance), value) for chance, value in zip((formulas, curves), seen, strict=True) if chance]
+        if all(decided(chance, value, CAMPAIGNS_AT_ONCE) for chance, value in each):
             break
-    return np.array(chance)
+    none = np.full(made, np.inf)
+    return np.array(formulas) if formulas else none, np.array(curves) if curves else none
 
 
 def best_of(net: FloatArray, n: int) -> Index:

@@ -27,10 +27,10 @@ WHERE = {
 
 def law_sentence(found: FoundLaw) -> str:
     """What follows what, where, in which regime and by how much."""
-    if found.law.shapes[0].kind == "curve":
+    if found.law.shapes[0].kind in ("curve", "surface"):
         return (
             f"{curve_sentence(found.law, found.levels)} (adjusted p {p_text(found.p)}). No formula that was tried "
-            "predicts tests that were left out as well as this curve."
+            f"predicts tests that were left out as well as this {found.law.shapes[0].kind}."
         )
     if found.levels:
         return f"{level_sentence(found.law, found.levels)} (adjusted p {p_text(found.p)})."
@@ -46,10 +46,13 @@ def level_sentence(law: WrittenLaw, levels: Mapping[str, Estimate]) -> str:
 
 
 def curve_sentence(law: WrittenLaw, places: Mapping[str, Estimate]) -> str:
-    """ "Sliding friction follows the humidity along a curve: −10 % (90 % interval −12 to −8 %) at 30 %, ..."."""
-    column = law.columns[0]
-    unit = COLUMNS[column].unit if column in COLUMNS else ""
+    """ "Sliding friction follows the humidity along a curve: −10 % (90 % interval −12 to −8 %) at 30 %, ..."; of a
+    surface, at pairs of values."""
+    column, *others = law.columns
+    unit = COLUMNS[column].unit if column in COLUMNS and not others else ""
     said = each_value(places, unit, "the mean over the tests")
+    if others:
+        return f"{subject(law)} follows {in_words(column)} and {in_words(others[0])} together: {said}"
     return f"{subject(law)} follows {in_words(column)} along a curve: {said}"
 
 
@@ -72,6 +75,9 @@ def size_sentence(
     if law.shapes[0].kind == "curve":
         column = in_words(law.columns[0])
         return f"{subject(law)} follows {column} along a curve; highest relative to lowest: {size}"
+    if law.shapes[0].kind == "surface":
+        columns = " and ".join(map(in_words, law.columns))
+        return f"{subject(law)} follows {columns} together; highest relative to lowest: {size}"
     if law.shapes[0].kind == "wave":
         return f"{subject(law)} {_wave(law.shapes[0])}; highest relative to lowest: {size}"
     return f"{subject(law)} {'is higher' if value > 0 else 'is lower'} ({size}) {_where(law, parameters)}"

@@ -1,0 +1,162 @@
+"""Laws of no known form: the curve of one column and the surface of two that a campaign speaks for most.
+
+A surface is a Gaussian process over two columns, a course of each and what they do together (an analysis of variance in
+functions: Durrande, Ginsbourger and Roustant, J. Multivariate Anal. 115, 57, 2013). What a campaign says for one is its
+marginal likelihood, averaged over sizes and lengths, less what the choice of the columns and of the scope costs; what
+chance gives the best of all is seen in campaigns that the model makes itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from tribo.diagnostics.fit import ModelFit
+from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of
+from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, T, WrittenLaw, scopes_of
+from tribo.lawsearch.scoring import Projection, effects_of, terms_of
+from tribo.mechanisms.record import Conditions
+from tribo.records import FloatArray
+
+OF_SERIES = {"run_order", "specimen_run", "elapsed_s", "clock_h"}  # days, drift and run-in follow these
+MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a meaning of their own come first
+NOISES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)  # variance that a law leaves, of that before
+DIRECTIONS = {1: 24, 2: 8}  # principal courses of each column of a curve, and of a surface
+
+
+class FreeSearch:
+    """All curves and surfaces of a campaign, each in every scope of a list, ready to be scored.
+
+    Parameters
+    ----------
+    model : ModelFit
+        The fitted campaign.
+    scopes : sequence of WrittenLaw
+        What they act on, in which regime and where.
+    cost : array (scopes,)
+        What the choice of each costs in log likelihood.
+    columns : sequence of tuples of str
+        The column of each curve, the two of each surface.
+    """
+
+    def __init__(
+        self, model: ModelFit, scopes: Sequence[WrittenLaw], cost: FloatArray, columns: Sequence[tuple[str, ...]]
+    ) -> None:
+        c = model.setup.observations.conditions
+        self.model, self.scopes, self.columns = model, tuple(scopes), tuple(columns)
+        names = {name for each in columns for name in each}
+        beside = max(len(names) - 1, 1)
+        self.cost = np.array([np.log(beside) if len(each) > 1 else 0.0 for each in columns])[:, None] + cost
+        self.courses = _principal_courses(c, columns)
+        self.projected = Projection(model, model.residual[None])
+        self.freedom = float(np.sum(self.projected.left**2))  # squares of one on average, as the noise was estimated
+        effects = effects_of(scopes, c, terms_of(model))
+        factor = self.projected.factor
+        # of every scope, what multiplies a course in the whitened rows, static and sliding (scopes, 2, n)
+        self.rows = np.stack(
+            [factor[:, 0, 0] * effects[:, :, 0],
+             factor[:, 1, 0] * effects[:, :, 0] + factor[:, 1, 1] * effects[:, :, 1]], axis=1,
+        )  # fmt: skip
+        self.spectra = [self._spectra(rows) for rows in self.rows]
+
+    def _spectra(self, rows: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Of each curve and surface in one scope, the information along its principal directions (k,), and these
+        directions as courses over the tests (n, k)."""
+        p, n = self.projected, self.projected.n
+        border = np.einsum("in,inm->mn", rows, p.border.reshape(2, n, -1))
+        specimens = int(p.specimen.max()) + 1
+        own = np.zeros((specimens, p.own.shape[1], n))
+        own[p.specimen, :, np.arange(n)] = np.einsum("in,ina->na", rows, p.own.reshape(2, n, -1))
+        absorbed, square = np.concatenate([border, own.reshape(-1, n)]), np.sum(rows**2, axis=0)
+        there = square > 0
+        absorbed = absorbed[:, there]
+        found = []
+        for course in self.courses:
+            here = course[there]
+            taken = absorbed @ here
+            information = here.T @ (square[there, None] * here) - taken.T @ taken
+            along, directions = np.linalg.eigh(information)
+            found.append((np.maximum(along, 0.0), course @ directions))
+        return found
+
+    def evidence(self, residual: FloatArray) -> FloatArray:
+        """Log marginal likelihood of every curve and surface over none, less what its choice costs, for residuals
+        (r, n, 2) of ln T, (r, columns, scopes).
+
+        What a law explains is not noise: each is judged at the noise that it leaves, in proportion to that of the
+        model.
+        """
+        left = Projection(self.model, residual).left
+        squares, left = np.sum(left**2, axis=0), left.reshape(2, self.projected.n, -1)
+        found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
+        for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
+            pull = np.einsum("in,inr->nr", rows, left)
+            for f, (along, courses) in enumerate(spectra):
+                found[:, f, g] = self._evidence(along, (courses.T @ pull) ** 2, squares)
+        return found - self.cost
+
+    def _evidence(self, along: FloatArray, pulls: FloatArray, squares: FloatArray) -> FloatArray:
+        """Log marginal likelihood (r,) from the information along (k,), the squared pulls (k, r) and the whole squares
+        (r,): averaged over sizes, at the likeliest noise."""
+        variance, free = SIZES[:, None] ** 2, self.freedom
+        found = np.full(len(squares), -np.inf)
+        for noise in NOISES:
+            shrunk = variance / (1.0 + variance * along / noise)
+            # sizes are those beside the noise of the model, so that only the pulls are in units of the campaign's own
+            each = 0.5 * shrunk @ (pulls / (noise * noise) * (free / squares))
+            each = each - 0.5 * np.sum(np.log1p(variance * along / noise), axis=1)[:, None]
+            best = each.max(axis=0)
+            mean = best + np.log(np.mean(np.exp(each - best), axis=0))
+            found = np.maximum(found, mean - 0.5 * free * (np.log(noise) + 1.0 / noise - 1.0))
+        return found
+
+
+def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> list[FloatArray]:
+    """The principal courses over the tests (n, k) of each curve and surface, each of a standard deviation of one in the
+    process that it comes from."""
+    of_column: dict[tuple[str, int], FloatArray] = {}
+    for name, alone in {(name, len(each)) for each in columns for name in each}:
+        shape = (curve_of(name, c) if alone == 1 else None) or knots_of(name, c)
+        assert shape is not None
+        variance, directions = np.linalg.eigh(np.mean(kernels(shape), axis=0))
+        course = at_knots((shape,), c) @ (directions * np.sqrt(np.maximum(variance, 0.0)))
+        of_column[name, alone] = course[:, ::-1][:, : DIRECTIONS[alone]]
+    found: list[FloatArray] = []
+    for each in columns:
+        courses = [of_column[name, len(each)] for name in each]
+        if len(each) > 1:
+            with_one = [np.column_stack([np.ones(len(course)), course]) for course in courses]
+            together = with_one[0][:, :, None] * with_one[1][:, None, :]
+            courses = [together.reshape(len(together), -1)[:, 1:]]
+        found.append(courses[0])
+    return found
+
+
+def free_columns(c: Conditions, without: Collection[str] = ()) -> list[tuple[str, ...]]:
+    """The columns of numbers that a curve may follow, and every two of which a surface may."""
+    names = [
+        name for name in (*UNITS, *c.columns)
+        if name not in OF_SERIES and name not in without and knots_of(name, c) is not None
+    ][:MOST_COLUMNS]  # fmt: skip
+    pairs = [pair for pair in combinations(names, 2) if not any(set(pair) <= alike for alike in ALIKE)]
+    return [*((name,) for name in names), *pairs]
+
+
+def free_scopes(c: Conditions, *, few: bool = False) -> tuple[list[WrittenLaw], FloatArray]:
+    """What curves and surfaces act on, and where, with what the choice of each costs: T of all samples and of any set
+    of them; with ``few``, of all and of each one."""
+    scopes, cost = scopes_of(c)
+    wheres = ("sample ",) if few else ("sample",)
+    kept = [k for k, s in enumerate(scopes) if s.acts_on == T and (s.where == ALL or s.where.startswith(wheres))]
+    return [scopes[k] for k in kept], cost[kept]
+
+
+def likeliest(search: FreeSearch, residual: FloatArray, columns: int) -> tuple[float, tuple[str, ...], WrittenLaw]:
+    """The likeliest curve (one of the ``columns``) or surface (two) for a residual (n, 2): its net log likelihood, its
+    columns and its scope; minus infinity where there is none."""
+    found = search.evidence(residual[None])[0]
+    found[[len(each) != columns for each in search.columns]] = -np.inf
+    f, g = np.unravel_index(int(np.argmax(found)), found.shape)
+    return float(found[f, g]), search.columns[f], search.scopes[g]
