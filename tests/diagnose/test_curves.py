@@ -122,3 +122,48 @@ def test_a_law_takes_the_place_of_the_misfit_of_its_column() -> None:
     d = with_laws(examine(made(two_humps, seed=2, design=DESIGN), replicates=(40, 40)))
     of_column = [m for m in d.verdict.misfits if "temperature" in m.covariate]
     assert [m.shows for m in of_column] == list(d.laws.laws)
+
+
+def warm_and_humid(s: Setup) -> np.ndarray:
+    """Friction is higher where it is warm and dry or cold and humid: neither column alone tells anything."""
+    c = s.observations.conditions
+    return (0.2 * np.sign((c.temperature_C - 23.0) * (c.humidity_pct - 45.0)))[:, None] * np.ones(2)
+
+
+@pytest.fixture(scope="module")
+def surface() -> FoundLaw:
+    (law,) = discover_laws(baseline(made(warm_and_humid, seed=2, design=DESIGN)), replicates=20).laws
+    return law
+
+
+def test_what_two_columns_do_only_together_is_a_surface(surface: FoundLaw) -> None:
+    assert set(surface.law.columns) == {"temperature_C", "humidity_pct"}
+    assert (surface.law.regime, surface.law.where) == ("both", "all")
+    assert [shape.kind for shape in surface.law.shapes] == ["surface", "surface"]
+    said = law_sentence(surface)
+    assert said.startswith("Friction follows the temperature and the humidity together: ")
+    assert len(surface.levels) == said.count(" %) at ") == 9
+
+
+def test_the_band_of_a_surface_holds_the_hidden_change(surface: FoundLaw) -> None:
+    s = surface.model.setup
+    true = centred(warm_and_humid(s), s.observations.conditions, terms_of(surface.model)["load term"])
+    assert ((surface.band[1] <= true) & (true <= surface.band[2])).mean() > 0.75
+    assert np.median(surface.band[2] - surface.band[1]) < 0.5 * np.ptp(true)
+
+
+def test_a_surface_is_written_and_read_again_and_holds_where_it_is_at_work(surface: FoundLaw, tmp_path: Path) -> None:
+    (tmp_path / "law.toml").write_text(law_text(surface.law, surface.parameters, "two columns"), encoding="utf-8")
+    again = read_law(tmp_path / "law.toml")
+    assert exact_text(again.law) == exact_text(surface.law)
+    there = baseline(made(warm_and_humid, seed=8, design=DESIGN))
+    assert validate_law(there, again.law, again.parameters).answer == "held"
+
+
+def test_a_surface_without_a_height_at_every_pair_is_refused(surface: FoundLaw, tmp_path: Path) -> None:
+    one, other = surface.law.shapes
+    for shapes in ((one,), (one, replace(other, heights=other.heights[1:]))):
+        law = replace(surface.law, shapes=shapes)
+        (tmp_path / "law.toml").write_text(law_text(law, surface.parameters, ""), encoding="utf-8")
+        with pytest.raises(CampaignError, match="surface"):
+            read_law(tmp_path / "law.toml")

@@ -188,6 +188,8 @@ def _abscissa(found: FoundLaw) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _label(law: WrittenLaw) -> str:
+    if law.shapes[0].kind == "surface":
+        return f"surface of {' and '.join(_name(column).lower() for column in law.columns)} (from lowest to highest)"
     if len(law.shapes) > 1:
         return f"{' × '.join(map(_name, law.columns))} (1: both at their highest)"
     unit = UNITS.get(law.columns[0], "")

@@ -15,8 +15,8 @@ from itertools import product
 import numpy as np
 
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.inference import gain_on_groups
 from tribo.diagnostics.gaps import enough_recorded
+from tribo.diagnostics.inference import gain_on_groups
 from tribo.lawsearch.grammar import (
     MOST_VALUES,
     PRESSURES,
@@ -118,7 +118,7 @@ def likely(shapes: Sequence[Shape]) -> list[FloatArray]:
     if len(each) == 1:
         return each[0]
     alike = (pair for k in (0, 1) for pair in product(each[0][2 + k :: 2], each[1][2 + k :: 2]))
-    return [np.kron(1.0 + one, 1.0 + other) - 1.0 for one, other in alike]
+    return [np.asarray(np.kron(1.0 + one, 1.0 + other) - 1.0, float) for one, other in alike]
 
 
 def fitted_curve(

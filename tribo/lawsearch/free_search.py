@@ -22,8 +22,8 @@ from tribo.records import FloatArray
 
 OF_SERIES = {"run_order", "specimen_run", "elapsed_s", "clock_h"}  # days, drift and run-in follow these
 MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a meaning of their own come first
-NOISES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)  # variance that a law leaves, of that before
-DIRECTIONS = {1: 24, 2: 8}  # principal courses of each column of a curve, and of a surface
+NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25])  # variance that a law leaves, of that before
+DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface
 
 
 class FreeSearch:
@@ -100,17 +100,15 @@ class FreeSearch:
     def _evidence(self, along: FloatArray, pulls: FloatArray, squares: FloatArray) -> FloatArray:
         """Log marginal likelihood (r,) from the information along (k,), the squared pulls (k, r) and the whole squares
         (r,): averaged over sizes, at the likeliest noise."""
-        variance, free = SIZES[:, None] ** 2, self.freedom
-        found = np.full(len(squares), -np.inf)
-        for noise in NOISES:
-            shrunk = variance / (1.0 + variance * along / noise)
-            # sizes are those beside the noise of the model, so that only the pulls are in units of the campaign's own
-            each = 0.5 * shrunk @ (pulls / (noise * noise) * (free / squares))
-            each = each - 0.5 * np.sum(np.log1p(variance * along / noise), axis=1)[:, None]
-            best = each.max(axis=0)
-            mean = best + np.log(np.mean(np.exp(each - best), axis=0))
-            found = np.maximum(found, mean - 0.5 * free * (np.log(noise) + 1.0 / noise - 1.0))
-        return found
+        free, noise = self.freedom, np.repeat(NOISES, len(SIZES))
+        variance = np.tile(SIZES**2, len(NOISES))
+        informed = 1.0 + (variance / noise)[:, None] * along  # (noises sizes, k)
+        explained = (variance / noise**2)[:, None] / informed @ pulls * (free / squares)
+        lost = np.sum(np.log(informed), axis=1) + free * (np.log(noise) + 1.0 / noise - 1.0)
+        each = (0.5 * (explained - lost[:, None])).reshape(len(NOISES), len(SIZES), -1)
+        best = each.max(axis=1, keepdims=True)
+        mean = best[:, 0] + np.log(np.mean(np.exp(each - best), axis=1))
+        return np.asarray(mean.max(axis=0))
 
 
 def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> list[FloatArray]:
@@ -145,18 +143,22 @@ def free_columns(c: Conditions, without: Collection[str] = ()) -> list[tuple[str
 
 
 def free_scopes(c: Conditions, *, few: bool = False) -> tuple[list[WrittenLaw], FloatArray]:
-    """What curves and surfaces act on, and where, with what the choice of each costs: T of all samples and of any set
-    of them; with ``few``, of all and of each one."""
+    """What curves and surfaces act on, and where, with what the choice of each costs: T or a term of it on all samples,
+    and T on any set of them; with ``few``, on all and on each one."""
     scopes, cost = scopes_of(c)
     wheres = ("sample ",) if few else ("sample",)
-    kept = [k for k, s in enumerate(scopes) if s.acts_on == T and (s.where == ALL or s.where.startswith(wheres))]
+    kept = [k for k, s in enumerate(scopes) if s.where == ALL or (s.acts_on == T and s.where.startswith(wheres))]
     return [scopes[k] for k in kept], cost[kept]
 
 
-def likeliest(search: FreeSearch, residual: FloatArray, columns: int) -> tuple[float, tuple[str, ...], WrittenLaw]:
-    """The likeliest curve (one of the ``columns``) or surface (two) for a residual (n, 2): its net log likelihood, its
-    columns and its scope; minus infinity where there is none."""
-    found = search.evidence(residual[None])[0]
-    found[[len(each) != columns for each in search.columns]] = -np.inf
-    f, g = np.unravel_index(int(np.argmax(found)), found.shape)
-    return float(found[f, g]), search.columns[f], search.scopes[g]
+def likeliest(
+    search: FreeSearch, residual: FloatArray, *numbers: int
+) -> list[tuple[float, tuple[str, ...], WrittenLaw]]:
+    """For each of the ``numbers`` of columns, the likeliest curve (one) or surface (two) for a residual (n, 2): its net
+    log likelihood, its columns and its scope; minus infinity where there is none."""
+    every, found = search.evidence(residual[None])[0], []
+    for number in numbers:
+        own = np.where(np.array([len(each) == number for each in search.columns])[:, None], every, -np.inf)
+        f, g = np.unravel_index(int(np.argmax(own)), own.shape)
+        found.append((float(own[f, g]), search.columns[f], search.scopes[g]))
+    return found

@@ -56,6 +56,7 @@ class ShapeTable(_Strict):
         "level",
         "levels",
         "curve",
+        "surface",
     ]
     column: str
     low: Finite = 0.0
@@ -64,7 +65,7 @@ class ShapeTable(_Strict):
     width: Finite | None = None
     level: str = ""
     values: list[Finite | str] = Field(default=[], max_length=MOST_KNOTS)
-    heights: list[Finite] = Field(default=[], max_length=MOST_KNOTS)
+    heights: list[Finite] = Field(default=[], max_length=MOST_KNOTS**2)
 
     def shape(self) -> Shape:
         nan = float("nan")
@@ -99,16 +100,25 @@ class LawTable(_Strict):
     @model_validator(mode="after")
     def _has_amplitudes(self) -> LawTable:
         shape = self.shape[0]
-        if (shape.kind in ("levels", "curve")) != (len(shape.values) > 1):
-            raise ValueError("levels and curves, and they alone, have two values or more")
+        of_values = ("levels", "curve", "surface")
+        if any((each.kind in of_values) != (len(each.values) > 1) for each in self.shape):
+            raise ValueError("levels, curves and surfaces, and they alone, have two values or more")
         if shape.kind == "levels" and len(shape.values) > MOST_VALUES:
             raise ValueError(f"levels are at most {MOST_VALUES} values")
+        if "surface" in (kinds := [each.kind for each in self.shape]) and kinds != ["surface", "surface"]:
+            raise ValueError("a surface has two shapes, one for each of its columns")
         for each in self.shape:
-            if len(each.heights) != (len(each.values) if each.kind == "curve" else 0):
-                raise ValueError("a curve, and nothing else, has a height at each of its values")
             numbers = [v for v in each.values if isinstance(v, float)]
-            if each.kind == "curve" and (numbers != sorted(set(numbers)) or len(numbers) < len(each.values)):
-                raise ValueError("the values of a curve are numbers, each larger than the one before")
+            if each.kind in ("curve", "surface") and (
+                numbers != sorted(set(numbers)) or len(numbers) < len(each.values)
+            ):
+                raise ValueError("the values of a curve or surface are numbers, each larger than the one before")
+            if len(each.heights) != (len(each.values) if each.kind == "curve" else 0) and each.kind != "surface":
+                raise ValueError("a curve has a height at each of its values; no other shape has, but a surface")
+        if shape.kind == "surface" and [len(each.heights) for each in self.shape] != [
+            0, len(shape.values) * len(self.shape[1].values),
+        ]:  # fmt: skip
+            raise ValueError("the second shape of a surface has a height at every pair of values")
         wanted = 2 if shape.kind == "wave" else len(shape.values) - 1 if shape.kind == "levels" else 1
         if missing := [name for name in AMPLITUDES[:wanted] if name not in self.parameters]:
             raise ValueError(f"[parameters.{missing[0]}] is missing")

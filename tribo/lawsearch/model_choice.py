@@ -211,8 +211,7 @@ def choose_free(
     """A law that no formula shows, found by a ``search`` for curves and surfaces: a surface, or what is best of one
     column."""
     c = model.setup.observations.conditions
-    apart, columns, scope = likeliest(search, model.residual, 2)
-    alone, (column, *_), _ = likeliest(search, model.residual, 1)
+    (alone, (column, *_), _), (apart, columns, scope) = likeliest(search, model.residual, 1, 2)
     if apart > alone:
         first = _surface(replace(scope, shapes=_knots(columns, c)), model)
         surface = _settled_surface(model, Background(model, _with_heights(first)), without)
@@ -248,11 +247,15 @@ def _likelier_surface(
     sets = free_columns(at.conditions, without)
     if set(law.columns) & OF_SERIES or not any(len(each) > 1 for each in sets):
         return None
-    search = FreeSearch(replace(at.without, residual=at.residual), *free_scopes(at.conditions), sets)
-    apart, columns, scope = likeliest(search, at.residual, 2)
-    if len(law.columns) == 1 and apart < likeliest(search, at.residual, 1)[0] + CLOSE:
+    left = replace(at.without, residual=at.residual)
+    few = FreeSearch(left, *free_scopes(at.conditions, few=True), [each for each in sets if len(each) > 1])
+    pair = likeliest(few, at.residual, 2)[0][1]
+    own = [each for each in sets if set(each) <= {*pair, *law.columns}]
+    search = FreeSearch(left, *free_scopes(at.conditions), own)
+    (alone, _, _), (apart, columns, scope) = likeliest(search, at.residual, 1, 2)
+    if len(law.columns) == 1 and apart < alone + CLOSE:
         return None
-    first = _surface(replace(scope, shapes=_knots(columns, at.conditions)), replace(at.without, residual=at.residual))
+    first = _surface(replace(scope, shapes=_knots(columns, at.conditions)), left)
     surface = _settled_surface(model, Background(model, _with_heights(first)), without)
     return surface if surface is not None and better_left_out(model, at.after, surface) else None
 
@@ -263,9 +266,11 @@ def _settled_surface(model: ModelFit, at: Background, without: Collection[str]) 
     sets = free_columns(at.conditions, without)
     for _ in range(ROUNDS):
         left = replace(at.without, residual=at.residual)
-        search = FreeSearch(left, *free_scopes(at.conditions), sets)
-        apart, columns, scope = likeliest(search, at.residual, 2)
-        if apart < likeliest(search, at.residual, 1)[0] + CLOSE:
+        _, columns, _ = likeliest(FreeSearch(left, *free_scopes(at.conditions, few=True), sets), at.residual, 2)[0]
+        own = [each for each in sets if set(each) <= set(columns)]
+        search = FreeSearch(left, *free_scopes(at.conditions), own)
+        (alone, _, _), (apart, columns, scope) = likeliest(search, at.residual, 1, 2)
+        if apart < alone + CLOSE:
             return None
         surface = _surface(replace(scope, shapes=_knots(columns, at.conditions)), left)
         if (columns, scope) == (at.law.columns, replace(at.law, shapes=())):
@@ -303,7 +308,8 @@ def _by_curve(model: ModelFit, curve: FreeCurve, p: float, rng: np.random.Genera
     apart = there[int(np.argmax(there @ heights))] - there[int(np.argmin(there @ heights))]
     (effect,) = _percents(np.array([apart @ heights * full]), (apart @ covariance @ apart).reshape(1, 1))
     told = _told_at(curve.law.shapes, at.conditions)
-    each = _percents(heights[list(told)] * full, covariance[np.ix_(list(told), list(told))])
+    about = np.eye(len(heights))[list(told)] - there.mean(axis=0)
+    each = _percents(about @ heights * full, about @ covariance @ about.T)
     levels = dict(zip(told.values(), each, strict=True))
     mean, spread = _beyond_patterns(at, curve)
     half = NORMAL_90 * wider * np.sqrt(spread)

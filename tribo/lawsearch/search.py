@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,13 +14,14 @@ from tribo.diagnostics.inference import gain_on_sessions
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes
 from tribo.lawsearch.grammar import WrittenLaw
-from tribo.lawsearch.model_choice import FoundLaw, choose_form, choose_free
+from tribo.lawsearch.model_choice import CLOSE, FoundLaw, choose_form, choose_free
 from tribo.lawsearch.scoring import Grammar, Index, Projection
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
 CAMPAIGNS_AT_ONCE = 20
 RESCORED, RESCORED_MEASURED = 60, 400  # best laws at the fitted noise that are scored with each campaign's own noise
+NEAR = -1.0  # net log likelihood of a curve or surface from which sets of samples are looked at
 SHOWN = 25  # of the best laws, in the table
 MOST_LAWS = 3
 TIMES = {"run_order", "elapsed_s", "clock_h", "date"}  # what days and drift follow as well
@@ -86,21 +87,21 @@ def discover_laws(
         scored = _scored(model, grammar)
         best, _, strongest = scored[0]
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
-        free = _worth_counting(model, used)
         # after Wilks, the chance that a law gains so much if it is the only one tried: less than that of the best of
         # all, so that a law which fails here needs no simulated campaigns
-        strongest = strongest if float(chdtrc(1, 2.0 * max(strongest, 0.0))) < level else -np.inf
-        seen = (strongest, float(free.evidence(model.residual[None]).max()) if free is not None else -np.inf)
-        if max(seen) == -np.inf:
+        p, draws = 1.0, (replicates, rng)
+        if float(chdtrc(1, 2.0 * max(strongest, 0.0))) < level:
+            p = share_beyond(_best_by_chance(model, grammar, strongest, draws, progress), strongest)
+        if p < level:
+            law = choose_form(model, grammar, best, p, rng)
+        elif (free := _worth_counting(model, used)) is not None:
+            likely = float(free.evidence(model.residual[None]).max())
+            p = share_beyond(_free_by_chance(model, free, likely, draws, progress), likely)
+            if p >= level:
+                break
+            law = choose_free(model, free, used, p, rng)
+        else:
             break
-        chance = _best_by_chance(model, (grammar, free), seen, (replicates, rng), progress)
-        p, p_free = (share_beyond(each, value) for each, value in zip(chance, seen, strict=True))
-        if min(p, p_free) >= level:
-            break
-        law = (
-            choose_form(model, grammar, best, p, rng) if free is None or p < level
-            else choose_free(model, free, used, p_free, rng)
-        )  # fmt: skip
         if set(law.law.columns) <= TIMES and not _predicts_sessions(model, law.model):
             break
         found.append(law)
@@ -126,48 +127,70 @@ def _scored(model: ModelFit, grammar: Grammar) -> list[tuple[WrittenLaw, float, 
 
 
 def _worth_counting(model: ModelFit, without: Collection[str]) -> FreeSearch | None:
-    """The search for curves and surfaces where one of them, on all samples or on one, is as likely as none: elsewhere
-    chance need not be counted."""
+    """The search for curves and surfaces where one of them is likelier than none by odds of 20 to 1: elsewhere chance
+    need not be counted. Sets of samples are looked at where all, or one of them, come near."""
     c = model.setup.observations.conditions
     columns = free_columns(c, without)
-    if not columns or FreeSearch(model, *free_scopes(c, few=True), columns).evidence(model.residual[None]).max() < 0.0:
+    if not columns:
         return None
-    return FreeSearch(model, *free_scopes(c), columns)
+    for few, least in ((True, NEAR), (False, CLOSE)):
+        search = FreeSearch(model, *free_scopes(c, few=few), columns)
+        if search.evidence(model.residual[None]).max() < least:
+            return None
+    return search
 
 
 def _best_by_chance(
     model: ModelFit,
-    searches: tuple[Grammar, FreeSearch | None],
-    seen: tuple[float, float],
+    grammar: Grammar,
+    strongest: float,
     draws: tuple[int, np.random.Generator],
     progress: Progress | None,
-) -> tuple[FloatArray, FloatArray]:
-    """The best net score of a formula, and of a curve or surface, in each of the campaigns that the model makes itself,
-    until they decide on those that were ``seen``; what was not seen (minus infinity) is not scored.
+) -> FloatArray:
+    """The best net score in each of the campaigns that the model makes itself, until they decide on ``strongest``.
 
-    All formulas are scored at the fitted noise, and the best of them with the noise estimated in each campaign.
+    All laws are scored at the fitted noise, and the best of them with the noise estimated in each campaign.
     """
-    (replicates, rng), (grammar, free) = draws, searches
-    formulas: list[float] = []
-    curves: list[float] = []
-    made = 0
-    while made < replicates:
-        drawn = drawn_residuals(model, rng, CAMPAIGNS_AT_ONCE)
-        made += CAMPAIGNS_AT_ONCE
-        if seen[0] > -np.inf:
-            again = refit(model, drawn)
-            for k, net in enumerate(grammar.net(Projection(model, drawn.transpose(0, 2, 1)))):
-                index = best_of(net, RESCORED)
-                formulas.append(float((grammar.gains(again.one(k), index)[0] - grammar.cost(index)).max()))
-        if free is not None:
-            curves += free.evidence(drawn.transpose(0, 2, 1)).max(axis=(1, 2)).tolist()
+
+    def best(drawn: FloatArray) -> Iterator[float]:
+        made = refit(model, drawn)
+        for k, net in enumerate(grammar.net(Projection(model, drawn.transpose(0, 2, 1)))):
+            index = best_of(net, RESCORED)
+            yield float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max())
+
+    return _by_chance(model, best, strongest, draws, progress)
+
+
+def _free_by_chance(
+    model: ModelFit,
+    free: FreeSearch,
+    likeliest: float,
+    draws: tuple[int, np.random.Generator],
+    progress: Progress | None,
+) -> FloatArray:
+    """The same of curves and surfaces, each at the noise that it leaves."""
+    return _by_chance(
+        model, lambda drawn: free.evidence(drawn.transpose(0, 2, 1)).max(axis=(1, 2)), likeliest, draws, progress
+    )
+
+
+def _by_chance(
+    model: ModelFit,
+    best: Callable[[FloatArray], Iterable[float]],
+    strongest: float,
+    draws: tuple[int, np.random.Generator],
+    progress: Progress | None,
+) -> FloatArray:
+    """The ``best`` of each of the campaigns that the model makes itself, until they decide on ``strongest``."""
+    replicates, rng = draws
+    chance: list[float] = []
+    while len(chance) < replicates:
+        chance += list(best(drawn_residuals(model, rng, CAMPAIGNS_AT_ONCE)))
         if progress is not None:
-            progress("discover", made, replicates)
-        each = [(np.array(chance), value) for chance, value in zip((formulas, curves), seen, strict=True) if chance]
-        if all(decided(chance, value, CAMPAIGNS_AT_ONCE) for chance, value in each):
+            progress("discover", len(chance), replicates)
+        if decided(np.array(chance), strongest, CAMPAIGNS_AT_ONCE):
             break
-    none = np.full(made, np.inf)
-    return np.array(formulas) if formulas else none, np.array(curves) if curves else none
+    return np.array(chance)
 
 
 def best_of(net: FloatArray, n: int) -> Index:
