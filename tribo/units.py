@@ -227,6 +227,7 @@ _SPELLINGS = {
     "degc": "degC",
     "c": "degC",
     "°f": "degF",
+    "f": "degF",
     "℃": "degC",
     "sek": "s",
     "sek.": "s",

@@ -159,11 +159,12 @@ def test_further_quantities_come_along_in_si_units(tmp_path: Path) -> None:
     assert read_export(path).columns["normal_force_N"] == pytest.approx(0.25)
 
 
-def test_degrees_fahrenheit_are_read_as_degrees_celsius(tmp_path: Path) -> None:
+@pytest.mark.parametrize("unit", ["°F", "F"])
+def test_degrees_fahrenheit_are_read_as_degrees_celsius(tmp_path: Path, unit: str) -> None:
     """Water freezes at 32 degrees F and boils at 212; a unit with an offset is converted by both its numbers."""
     rows = [[*row, fahrenheit] for row, fahrenheit in zip(ramp(9), ["32.0", "212.0", "73.4"] * 3, strict=True)]
     path = tmp_path / "a.csv"
-    path.write_bytes(written(rows, (*NAMES, "Temperature"), (*UNITS, "°F")))
+    path.write_bytes(written(rows, (*NAMES, "Temperature"), (*UNITS, unit)))
     assert read_export(path).columns["temperature_C"] == pytest.approx([0.0, 100.0, 23.0] * 3, abs=1e-9)
 
 
