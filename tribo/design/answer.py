@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tribo.berardo2019.published_tables import load_table2, load_table2_simulated_anew
-from tribo.design.rounds import Found, Lengths, Response, Say, Surrogate, Tried, misses, reached, responses, search
+from tribo.design.rounds import Lengths, Response, Say, Surrogate, Surrogates, Tried, misses, reached, responses, search
 from tribo.design.target import Space, Target, Want, corrections_of_report, laws_of_report
 from tribo.errors import Problem, SimulationError
 from tribo.springblock.calibration import CalibrationRuns, calibrate
@@ -82,12 +82,12 @@ def design(target: Target, folder: Path, kept: Path, seed: int, jobs: int, say: 
     if laws:
         few = CalibrationRuns(repeats=2, iterations=3, seed=seed)
         base = base.with_(friction=calibrate(laws["static"], laws["sliding"], base, few, jobs))
-    found = search(spaces, target, base, kept, seed, jobs, say)
+    coarse, fine, finer, surrogates = search(spaces, target, base, kept, seed, jobs, say)
     errors = model_errors(target, report)
-    mesh = {r: found.finer[1].logs[r] - found.finer[0].logs[r] for r in responses(target)}
-    answers = [answered(k + 1, t, found, spaces, target, errors, mesh) for k, t in enumerate(found.fine)]
+    mesh = {r: finer[1].logs[r] - finer[0].logs[r] for r in responses(target)}
+    answers = [answered(k + 1, t, surrogates, spaces, target, errors, mesh) for k, t in enumerate(fine)]
     answers.sort(key=lambda a: (not a.met, a.rank))
-    refusal = [] if any(a.met for a in answers) else refused(found, spaces, target, answers[0])
+    refusal = [] if any(a.met for a in answers) else refused([*coarse, *fine], spaces, target, answers[0])
     contact = "rigid" if base.contact_stiffness_Pa_per_m is None else "elastic"
     moved = ", ".join(f"{r[0]} along {r[2]} {100 * (math.exp(v) - 1):+.1f} %" for r, v in mesh.items())
     notes = [f"contact is {contact}; halving the mesh of 2.5 um moves {moved}"]
@@ -127,14 +127,14 @@ def model_errors(target: Target, report: Path | None) -> dict[str, tuple[float, 
 
 
 def answered(
-    rank: int, t: Tried, found: Found, spaces: Sequence[Space], target: Target,
+    rank: int, t: Tried, surrogates: Surrogates, spaces: Sequence[Space], target: Target,
     errors: dict[str, tuple[float, float]], mesh: dict[Response, float],
 ) -> Answer:  # fmt: skip
     """The prediction of one design for everything that is wanted."""
     space = spaces[t.space]
     logs = {r: v + errors[r[0]][0] for r, v in t.logs.items()}
-    surrogates = found.surrogates.get(t.space)
-    slopes = {want.text(): slopes_of(want, target, space, t.lengths_um, surrogates) for want in target.target}
+    own = surrogates.get(t.space)
+    slopes = {want.text(): slopes_of(want, target, space, t.lengths_um, own) for want in target.target}
     predictions = []
     for want in target.target:
         value = float(reached(want, target, logs))
@@ -189,11 +189,11 @@ def goal_text(want: Want, target: Target) -> str:
     return " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound)
 
 
-def refused(found: Found, spaces: Sequence[Space], target: Target, nearest: Answer) -> list[str]:
+def refused(known: Sequence[Tried], spaces: Sequence[Space], target: Target, nearest: Answer) -> list[str]:
     """Why no design meets the target: what was reached at most, the nearest, and the limits it lies at."""
     said = []
     for want, p in zip(target.target, nearest.predictions, strict=True):
-        values = np.exp([float(reached(want, target, t.logs)) for t in (*found.coarse, *found.fine)])
+        values = np.exp([float(reached(want, target, t.logs)) for t in known])
         if not p.met:
             said.append(
                 f"{p.want}: wanted {p.goal}; {len(values)} patterns of these families reach {values.min():.3g} to "

@@ -115,14 +115,7 @@ class Tried:
     errors: dict[Response, float]
 
 
-@dataclass(frozen=True)
-class Found:
-    """What a search has: all coarse designs, the surrogates of each family, and the fine designs, best first."""
-
-    coarse: list[Tried]
-    fine: list[Tried]
-    finer: list[Tried]  # the same on half the mesh
-    surrogates: dict[int, dict[Response, Surrogate]]
+Surrogates = dict[int, dict[Response, Surrogate]]  # of each family and response
 
 
 def responses(target: Target) -> list[Response]:
@@ -212,9 +205,9 @@ def tried(
     return found
 
 
-def surrogates_of(spaces: Sequence[Space], known: Sequence[Tried]) -> dict[int, dict[Response, Surrogate]]:
+def surrogates_of(spaces: Sequence[Space], known: Sequence[Tried]) -> Surrogates:
     """One surrogate for each family and response."""
-    found: dict[int, dict[Response, Surrogate]] = {}
+    found: Surrogates = {}
     for number, space in enumerate(spaces):
         own = [t for t in known if t.space == number]
         if len(own) < 4:
@@ -228,7 +221,7 @@ def surrogates_of(spaces: Sequence[Space], known: Sequence[Tried]) -> dict[int, 
 
 
 def promising(
-    spaces: Sequence[Space], known: Sequence[Tried], surrogates: dict[int, dict[Response, Surrogate]],
+    spaces: Sequence[Space], known: Sequence[Tried], surrogates: Surrogates,
     target: Target, shift: dict[Response, float], n: int, seed: int,
 ) -> list[tuple[int, Lengths]]:  # fmt: skip
     """The n designs of least expected cost that lie apart from each other and are not known yet."""
@@ -256,8 +249,12 @@ def promising(
 
 def search(
     spaces: Sequence[Space], target: Target, base: SimConfig, folder: Path, seed: int, jobs: int, say: Say
-) -> Found:
-    """Coarse runs over each family, rounds of more where the surrogate expects the target, then fine ones."""
+) -> tuple[list[Tried], list[Tried], list[Tried], Surrogates]:
+    """Coarse runs over each family, rounds of more where the surrogate expects the target, then fine ones.
+
+    Returns all coarse designs, the fine ones, best first, the best one on the patch of the fine mesh and of half of
+    it, and the surrogates.
+    """
     wanted = responses(target)
     all_rounds = Rounds(spaces, wanted, folder, seed, jobs)
     coarse, fine, patch, halved = (
@@ -303,4 +300,4 @@ def search(
             distinct.append(t)
     pairs = [(t.space, t.lengths_um) for t in distinct[:1]]
     finer = made("mesh-2", pairs, patch, 2, seed + 200, 6) + made("mesh-1", pairs, halved, 2, seed + 200, 40)
-    return Found(known, distinct, finer, surrogates)
+    return known, distinct, finer, surrogates

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -32,27 +31,9 @@ FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
 NEAR = 0.25  # by which a factor may differ from that of a slip, as ln
 
 
-@dataclass(frozen=True)
-class _Pulls:
-    """Pulls of one regime: places in the campaign's order, forces and loads (n,), cells by number (n,)."""
-
-    test_id: np.ndarray
-    sample: np.ndarray
-    specimen: np.ndarray
-    load_N: FloatArray
-    log_force: FloatArray
-    level: np.ndarray
-
-    @property
-    def cell(self) -> np.ndarray:
-        """Pulls of one sample at one load share a number."""
-        names = pd.MultiIndex.from_arrays([self.sample, self.level])
-        return np.asarray(pd.factorize(names)[0])
-
-    @property
-    def body(self) -> np.ndarray:
-        """Pulls of one specimen in one sample share a number."""
-        return np.asarray(pd.factorize(pd.MultiIndex.from_arrays([self.sample, self.specimen]))[0])
+# pulls of one regime, each (n,): test_id, sample, specimen, load_N, log_force; and the numbers of the level of load, of
+# the cell (one sample at one load) and of the body (one specimen in one sample) that a pull belongs to
+Pulls = Mapping[str, np.ndarray]
 
 
 def sibling_doubts(
@@ -76,22 +57,22 @@ def sibling_doubts(
     groups: list[tuple[set[str], float, list[str]]] = []
     for regime in REGIMES if len(table) else ():
         pulls = _pulls_of(table, regime)
-        if len(pulls.log_force) < 6:
+        if len(pulls["log_force"]) < 6:
             continue
         apart, log_factor = _split(pulls, plausible)
         if apart.any():
-            names = set(pulls.test_id[apart].tolist())
+            names = set(pulls["test_id"][apart].tolist())
             same = [group for group in groups if abs(group[1] - log_factor) < NEAR and group[0] & names]
             if same:
                 same[0][0].update(names)
                 same[0][2].append(regime)
             else:
                 groups.append((names, log_factor, [regime]))
-        mended = pulls.log_force - np.where(apart, log_factor, 0.0)
+        mended = pulls["log_force"] - np.where(apart, log_factor, 0.0)
         for k, deviation, reach in _far(pulls, mended, seed):
             if not apart[k]:
-                expected = float(np.exp(pulls.log_force[k] - deviation))
-                found.setdefault(str(pulls.test_id[k]), {})[regime] = (deviation, expected, reach)
+                expected = float(np.exp(pulls["log_force"][k] - deviation))
+                found.setdefault(str(pulls["test_id"][k]), {})[regime] = (deviation, expected, reach)
     for names, log_factor, regimes in groups:
         doubts.append(_of_group(campaign, sorted(names), log_factor, regimes, len(table)))
     doubts += _copied(table)
@@ -123,47 +104,51 @@ def _copied(table: pd.DataFrame) -> Iterator[Doubt]:
                 yield Doubt("siblings", name, found, "numbers of its own", where, slip, tests=both)
 
 
-def _pulls_of(table: pd.DataFrame, regime: str) -> _Pulls:
+def _pulls_of(table: pd.DataFrame, regime: str) -> Pulls:
     rows = table[(table[f"{regime}_N"] > 0) & (table["normal_load_N"] > 0)]
     load = rows["normal_load_N"].to_numpy(float)
-    return _Pulls(
-        rows["test_id"].to_numpy(str), rows["sample"].to_numpy(str), rows["specimen"].to_numpy(str), load,
-        np.log(rows[f"{regime}_N"].to_numpy(float)), pd.factorize(levels_of(load, LOAD_TOLERANCE))[0],
-    )  # fmt: skip
+    sample, specimen = rows["sample"].to_numpy(str), rows["specimen"].to_numpy(str)
+    level = pd.factorize(levels_of(load, LOAD_TOLERANCE))[0]
+    cell, body = (pd.factorize(pd.MultiIndex.from_arrays([sample, kind]))[0] for kind in (level, specimen))
+    return {
+        "test_id": rows["test_id"].to_numpy(str), "sample": sample, "specimen": specimen, "load_N": load,
+        "log_force": np.log(rows[f"{regime}_N"].to_numpy(float)), "level": level, "cell": cell, "body": body,
+    }  # fmt: skip
 
 
-def _split(pulls: _Pulls, plausible: tuple[float, float]) -> tuple[np.ndarray, float]:
+def _split(pulls: Pulls, plausible: tuple[float, float]) -> tuple[np.ndarray, float]:
     """The wrong part of the pulls, (n,) of bool, where many cells fall into two parts, and ln of its factor.
 
     Wrong is the part without which T/N is plausible, and the smaller one where both or none are.
     """
-    low, high = np.zeros((2, len(pulls.log_force)), bool)
+    low, high = np.zeros((2, len(pulls["log_force"])), bool)
     factors, several = [], 0
-    for cell in range(pulls.cell.max() + 1):
-        rows = np.flatnonzero(pulls.cell == cell)
+    for cell in range(pulls["cell"].max() + 1):
+        rows = np.flatnonzero(pulls["cell"] == cell)
         several += len(rows) > 1
-        order = rows[np.argsort(pulls.log_force[rows])]
-        steps = np.diff(pulls.log_force[order])
+        order = rows[np.argsort(pulls["log_force"][rows])]
+        steps = np.diff(pulls["log_force"][order])
         if len(rows) > 1 and steps.max() > math.log(SPLIT):
             at = int(np.argmax(steps)) + 1
             low[order[:at]], high[order[at:]] = True, True
-            factors.append(pulls.log_force[order[at:]].mean() - pulls.log_force[order[:at]].mean())
+            factors.append(pulls["log_force"][order[at:]].mean() - pulls["log_force"][order[:at]].mean())
     if len(factors) < max(FEWEST_SPLIT, LEAST_SPLIT * several):
         return np.zeros(len(low), bool), 0.0
     factor = float(np.median(factors))
     either = []
     for part, log_factor in ((low, -factor), (high, factor)):
-        beside = _beside_law(pulls, pulls.log_force - np.where(part, log_factor, 0.0))
+        beside = _beside_law(pulls, pulls["log_force"] - np.where(part, log_factor, 0.0))
         wrong = part | (np.abs(beside - log_factor) < NEAR)
-        log_ratio = pulls.log_force - np.where(wrong, log_factor, 0.0) - np.log(pulls.load_N)
-        usual = [float(np.exp(np.median(log_ratio[pulls.sample == sample]))) for sample in np.unique(pulls.sample)]
+        log_ratio = pulls["log_force"] - np.where(wrong, log_factor, 0.0) - np.log(pulls["load_N"])
+        samples = pulls["sample"]
+        usual = [float(np.exp(np.median(log_ratio[samples == sample]))) for sample in np.unique(samples)]
         odd = not all(plausible[0] <= ratio <= plausible[1] for ratio in usual)
         either.append((odd, int(wrong.sum()), wrong, log_factor))
     _, _, wrong, log_factor = min(either, key=lambda found: found[:2])
     return wrong, log_factor
 
 
-def _far(pulls: _Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, float, float]]:
+def _far(pulls: Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, float, float]]:
     """Place, deviation of ln T from the siblings, and the deviation that chance reaches, of each pull beyond it."""
     left = _from_siblings(pulls, _beside_law(pulls, log_force)[:, None])[:, 0]
     rng = np.random.default_rng(seed)
@@ -176,12 +161,12 @@ def _far(pulls: _Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int,
         yield int(k), float(left[k]), float(limit * spread[k])
 
 
-def _beside_law(pulls: _Pulls, log_force: FloatArray) -> FloatArray:
+def _beside_law(pulls: Pulls, log_force: FloatArray) -> FloatArray:
     """ln T less that of a straight line T = mu N + T0 of its sample, by repeated medians (Siegel 1982), shape (n,)."""
     left = np.empty_like(log_force)
-    for sample in np.unique(pulls.sample):
-        rows = np.flatnonzero(pulls.sample == sample)
-        x, ratio = 1.0 / pulls.load_N[rows], np.exp(log_force[rows]) / pulls.load_N[rows]
+    for sample in np.unique(pulls["sample"]):
+        rows = np.flatnonzero(pulls["sample"] == sample)
+        x, ratio = 1.0 / pulls["load_N"][rows], np.exp(log_force[rows]) / pulls["load_N"][rows]
         apart = x[:, None] - x[None, :]
         with np.errstate(divide="ignore", invalid="ignore"):
             slopes = np.where(
@@ -190,16 +175,16 @@ def _beside_law(pulls: _Pulls, log_force: FloatArray) -> FloatArray:
         known = np.isfinite(slopes).any(axis=1)
         slope = float(np.median(np.nanmedian(slopes[known], axis=1))) if known.any() else 0.0
         line = slope * x + np.median(ratio - slope * x)
-        level = np.log(line * pulls.load_N[rows]) if (line > 0).all() else np.median(log_force[rows])
+        level = np.log(line * pulls["load_N"][rows]) if (line > 0).all() else np.median(log_force[rows])
         left[rows] = log_force[rows] - level
     return left
 
 
-def _from_siblings(pulls: _Pulls, values: FloatArray) -> FloatArray:
+def _from_siblings(pulls: Pulls, values: FloatArray) -> FloatArray:
     """Values, shape (n, m), less the medians of their cells and specimens of three pulls or more (Tukey's polish)."""
     left = values - np.median(values, axis=0)
     for _ in range(3):
-        for kinds in (pulls.cell, pulls.body):
+        for kinds in (pulls["cell"], pulls["body"]):
             for kind in range(kinds.max() + 1):
                 rows = np.flatnonzero(kinds == kind)
                 if len(rows) > 2:
@@ -207,7 +192,7 @@ def _from_siblings(pulls: _Pulls, values: FloatArray) -> FloatArray:
     return left
 
 
-def _spread(pulls: _Pulls, left: FloatArray) -> FloatArray:
+def _spread(pulls: Pulls, left: FloatArray) -> FloatArray:
     """Robust standard deviation at each pull, shape (n, m): of the whole campaign, or of its load where that is larger.
 
     The smaller half of what a polish leaves is near zero: the 75 % quantile of the absolute values is taken.
@@ -215,8 +200,8 @@ def _spread(pulls: _Pulls, left: FloatArray) -> FloatArray:
     size = np.abs(left)
     quantile = 1.15  # of a normal deviate, that three quarters of the absolute values are below
     spread = np.broadcast_to(np.quantile(size, 0.75, axis=0) / quantile, size.shape).copy()
-    for level in range(pulls.level.max() + 1):
-        rows = np.flatnonzero(pulls.level == level)
+    for level in range(pulls["level"].max() + 1):
+        rows = np.flatnonzero(pulls["level"] == level)
         if len(rows) >= 6:
             spread[rows] = np.maximum(spread[rows], np.quantile(size[rows], 0.75, axis=0) / quantile)
     return spread
