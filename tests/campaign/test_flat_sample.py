@@ -11,7 +11,7 @@ import pytest
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.campaign.load import required_flat_sample, with_flat_sample
-from tribo.comparison.study_lookup import flat_sample
+from tribo.comparison.findings import flat_sample
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.planning import plan_design
 from tribo.errors import CampaignError

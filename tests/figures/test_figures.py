@@ -17,7 +17,7 @@ from matplotlib.text import Text
 from matplotlib.textpath import TextPath
 from report.synthetic import AREA_M2, make_study
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings
 from tribo.figures import measured_friction
 from tribo.figures.catalogue import FIGURES
 from tribo.figures.style import (
@@ -220,7 +220,7 @@ def test_fig4_means_have_the_standard_deviation_of_the_mean(study: Study) -> Non
 
 def test_fig4_curve_is_mu_plus_tau0_over_p(study: Study) -> None:
     numbers = FIGURES["fig4"].numbers(study)
-    fit = study_lookup.fit_of(study.fits, "C", "sliding")
+    fit = findings.fit_of(study.fits, "C", "sliding")
     assert fit is not None
     curve = numbers[(numbers["sample"] == "C") & (numbers["regime"] == "sliding") & (numbers["mark"] == "fit")]
     expected = fit.value("mu") + fit.value("tau0_Pa") / 1e3 / curve["pressure_kPa"]
@@ -229,7 +229,7 @@ def test_fig4_curve_is_mu_plus_tau0_over_p(study: Study) -> None:
 
 def test_the_area_prediction_is_the_flat_force_times_the_area_fraction(study: Study) -> None:
     numbers = FIGURES["fig6"].numbers(study)
-    flat = study_lookup.fit_of(study.fits, "F", "static")
+    flat = findings.fit_of(study.fits, "F", "static")
     assert flat is not None
     line = numbers[(numbers["sample"] == "C") & (numbers["mark"] == "AF prediction")]
     expected = flat.force_N(line["normal_load_N"].to_numpy(float)) * study.ingested.campaign.area_fraction("C")

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.comparison.study_lookup import load_levels
+from tribo.comparison.findings import load_levels
 from tribo.fitting import outlying_pulls, outlying_specimens, power_of_campaign
 from tribo.fitting.assessment import outlying_sentences, power_sentences
 from tribo.records import REGIMES

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from report.laid_out import html
-from tribo.comparison.study_lookup import ODD_SCORE, standings
+from tribo.comparison.findings import ODD_SCORE, standings
 from tribo.records import Study
 from tribo.wording import study_sentences as wording
 

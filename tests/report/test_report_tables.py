@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.comparison.study_lookup import all_set_aside
+from tribo.comparison.findings import all_set_aside
 from tribo.errors import Problem
 from tribo.outputs import csv_text
 from tribo.records import SetAside, Study

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings
 from tribo.diagnostics.effect_sizes import percent, rms_percent
 from tribo.diagnostics.model import effect_of
 from tribo.figures import style
@@ -52,7 +52,7 @@ def extended_numbers(d: Diagnosis) -> pd.DataFrame:
     residuals = {"before": f.residual, "after": d.named.model.residual}
     if d.simulated is not None:
         residuals["simulated"] = o.log_force - d.simulated.log_force
-    levels = study_lookup.load_levels(o.conditions.normal_load_N)
+    levels = findings.load_levels(o.conditions.normal_load_N)
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     rows = [
         {

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Transform
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings
 from tribo.comparison.findings import ratios_of
 from tribo.errors import Problem, TriboError
 from tribo.figures import style
@@ -42,10 +42,10 @@ def ratio_numbers(study: Study) -> pd.DataFrame:
     if table.empty or not study.ingested.campaign.has_area:
         return pd.DataFrame(columns=RATIO_COLUMNS)
     frames = []
-    for sample, number in study_lookup.sample_numbers(study).items():
+    for sample, number in findings.sample_numbers(study).items():
         pulls = table[table["sample"] == sample]
         pattern = study.ingested.campaign.samples.get(sample)
-        group = "anisotropic" if pattern is not None and study_lookup.is_anisotropic(pattern) else "isotropic"
+        group = "anisotropic" if pattern is not None and findings.is_anisotropic(pattern) else "isotropic"
         for regime in REGIMES:
             points = _means(pulls, regime, study.ingested.campaign.area_m2)
             part = pd.concat([points, _curve(study, sample, regime, points)], ignore_index=True)
@@ -55,7 +55,7 @@ def ratio_numbers(study: Study) -> pd.DataFrame:
 
 def _means(pulls: pd.DataFrame, regime: Regime, area_m2: float) -> pd.DataFrame:
     pulls = pulls[np.isfinite(pulls[f"{regime}_N"])]
-    level_N = study_lookup.load_levels(pulls["normal_load_N"].to_numpy(float))
+    level_N = findings.load_levels(pulls["normal_load_N"].to_numpy(float))
     ratio = pulls[f"{regime}_N"] / pulls["normal_load_N"]
     cells = ratio.groupby(level_N / area_m2 / 1e3).agg(["mean", "sem", "count"])
     cells = cells.rename_axis("pressure_kPa").reset_index()
@@ -141,7 +141,7 @@ def force_numbers(regime: Regime) -> Callable[[Study], pd.DataFrame]:
                 regime=regime,
                 area_fraction=_area_fraction(study, sample),
             )
-            for sample, number in study_lookup.sample_numbers(study).items()
+            for sample, number in findings.sample_numbers(study).items()
         ]
         return pd.concat(frames, ignore_index=True).reindex(columns=FORCE_COLUMNS)
 
@@ -165,8 +165,8 @@ def _one_sample(study: Study, sample: str, regime: Regime, pulls: pd.DataFrame) 
     line = np.linspace(0.0, 1.05 * loads.max(), LINE_POINTS)
     simulated = study.comparison.simulated if study.comparison is not None else ()
     frames = [points, *_fit_line("fit", study.fits.of(sample, regime), line, band=True)]
-    frames += _fit_line("simulated", study_lookup.fit_of(simulated, sample, regime), line)
-    flat = study.fits.of(study_lookup.flat_sample(study), regime)
+    frames += _fit_line("simulated", findings.fit_of(simulated, sample, regime), line)
+    flat = study.fits.of(findings.flat_sample(study), regime)
     if flat is not None:
         forces = flat.force_N(line) * _area_fraction(study, sample)
         frames.append(pd.DataFrame({"mark": "AF prediction", "normal_load_N": line, "T_N": forces}))
@@ -273,7 +273,7 @@ COLOURS = {"measured": style.VERMILLION, "simulated": style.GREEN, "AF predictio
 
 def area_numbers(study: Study) -> pd.DataFrame:
     """mu and tau0 (kPa) of every sample with standard uncertainties, their line in AF, the AF prediction."""
-    order = study_lookup.sample_numbers(study)
+    order = findings.sample_numbers(study)
     simulated = study.comparison.simulated if study.comparison is not None else ()
     fractions = {study.ingested.campaign.area_fraction(s) for s in order if s in study.ingested.campaign.samples}
     if study.comparison is None and (len(fractions) < 2 or not study.ingested.campaign.has_area):
@@ -283,7 +283,7 @@ def area_numbers(study: Study) -> pd.DataFrame:
         for parameter in PARAMETERS:
             measured = _area_points(study, study.fits, regime, parameter, "measured", order)
             model = _area_points(study, simulated, regime, parameter, "simulated", order)
-            flat = study.fits.of(study_lookup.flat_sample(study), regime)
+            flat = study.fits.of(findings.flat_sample(study), regime)
             frames += [measured, model, _line(measured), _prediction(flat, measured, parameter)]
             frames[-2:] = [f.assign(regime=regime, parameter=parameter) for f in frames[-2:]]
     filled = [f for f in frames if not f.empty]
@@ -462,7 +462,7 @@ def residuals_of_fits(study: Study) -> pd.DataFrame:
     table = study.residuals()
     if table.empty:
         raise TriboError(Problem("nothing_to_draw", "the study holds no fits, so there are no residuals"))
-    numbers = table["sample"].map(study_lookup.sample_numbers(study))
+    numbers = table["sample"].map(findings.sample_numbers(study))
     columns = ["sample_number", "sample", "regime", "test_id", "specimen", "normal_load_N", "residual_percent"]
     return table.assign(sample_number=numbers)[columns]
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from tribo.comparison.study_lookup import sample_numbers, shown
+from tribo.comparison.findings import sample_numbers, shown
 from tribo.figures import style
 from tribo.fitting.alternatives import SPEED, force_N, measured_points, test_values, variables_of
 from tribo.fitting.linear import meant_to_be_one

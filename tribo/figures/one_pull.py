@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings
 from tribo.figures import style
 from tribo.records import FloatArray, Pull, Study, Test, Trace
 
@@ -59,7 +59,7 @@ def example_tests(study: Study) -> dict[str, Test]:
 
 
 def _typical(tests: list[Test], study: Study) -> Test:
-    levels = study_lookup.load_levels(np.array([t.normal_load_N for t in tests]))
+    levels = findings.load_levels(np.array([t.normal_load_N for t in tests]))
     distinct = np.unique(levels)
     middle = distinct[len(distinct) // 2]
     pulls = study.ingested.pulls
@@ -73,7 +73,7 @@ def _typical(tests: list[Test], study: Study) -> Test:
 
 def example_numbers(study: Study) -> pd.DataFrame:
     """Force over static peak against time (s, as recorded) of the example pulls, with peak and window."""
-    order = study_lookup.sample_numbers(study)
+    order = findings.sample_numbers(study)
     examples = sorted(example_tests(study).items(), key=lambda item: order[item[0]])
     frames = []
     for sample, test in examples:

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tribo.comparison.study_lookup import sample_numbers, shown
+from tribo.comparison.findings import sample_numbers, shown
 from tribo.figures import style
 from tribo.records import Reading, Study
 from tribo.vocabulary import label_with_unit

@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings
 from tribo.figures import style
 from tribo.figures.one_pull import thin_trace
 from tribo.records import FloatArray, Run, Study
@@ -172,7 +172,7 @@ PATTERNS_ACROSS, SIDE_MM, LEGEND_COLUMNS = 6, 27.0, 6
 
 def runs_numbers(study: Study) -> pd.DataFrame:
     """T/N against time (ms) of the example runs, thinned for the page, with peak, sliding window and pattern."""
-    order = study_lookup.sample_numbers(study)
+    order = findings.sample_numbers(study)
     first_runs = {run.sample: run for run in reversed(study.example_runs)}
     known = sorted(first_runs, key=lambda s: order.get(s, len(order)))
     frames = [run_numbers(first_runs[s], order.get(s, len(order) + k)) for k, s in enumerate(known)]
@@ -277,7 +277,7 @@ _BEFORE, _AFTER = 0.15, 3.0  # of the way from onset to peak: how much is drawn 
 
 def compared_numbers(study: Study) -> pd.DataFrame:
     """Force (N) over the way of the drive (mm) from the onset of the rise: a pull and the run beside it."""
-    ingested, order = study.ingested, study_lookup.sample_numbers(study)
+    ingested, order = study.ingested, findings.sample_numbers(study)
     tests = {test.test_id: test for test in ingested.campaign.tests}
     frames = []
     for test_id, (run, read, features) in study.recorded_runs.items():

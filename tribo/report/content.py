@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from tribo import __version__
-from tribo.comparison import findings, study_lookup
-from tribo.comparison.study_lookup import all_set_aside
+from tribo.comparison import findings
+from tribo.comparison.findings import all_set_aside
 from tribo.diagnostics.verdict import Verdict
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.outputs import unit_of
@@ -120,7 +120,7 @@ def _summary(study: Study) -> dict[str, Any]:
     return {
         "measured": wording.what_was_measured(study),
         "flat": wording.flat_law(study) if study.comparison is not None else [],
-        "model": wording.in_short(agreements, study_lookup.flat_sample(study)),
+        "model": wording.in_short(agreements, findings.flat_sample(study)),
         "order": [wording.ranking_sentence(r) for r in findings.rankings(study)],
         "directions": wording.direction_sentences(findings.direction_ratios(study)),
         "correlation": " ".join(filter(None, (wording.pooling_note(study), wording.correlation_note(study)))),
@@ -134,10 +134,10 @@ def _table2(study: Study) -> dict[str, Any]:
     regimes = []
     for regime in REGIMES:
         rows: list[tuple[Any, ...]] = []
-        for sample in study_lookup.sample_numbers(study):
+        for sample in findings.sample_numbers(study):
             fit = study.fits.of(sample, regime)
             if fit is not None:
-                model = fit_cells(study_lookup.fit_of(simulated, sample, regime), load)
+                model = fit_cells(findings.fit_of(simulated, sample, regime), load)
                 area_fraction = study.ingested.campaign.area_fraction(sample)
                 rows.append((sample, area_fraction, fit_cells(fit, load), model, fit))
         if rows:
@@ -153,7 +153,7 @@ def _agreement_tables(study: Study) -> list[dict[str, Any]]:
         if not part:
             continue
         every_load = np.array([load.normal_load_N for a in part for load in a.loads])
-        levels = study_lookup.load_levels(every_load)
+        levels = findings.load_levels(every_load)
         level_of = dict(zip(every_load.tolist(), levels.tolist(), strict=True))
         columns = sorted(set(levels.tolist()))
         rows = [
@@ -191,7 +191,7 @@ def budget_tables(study: Study) -> list[dict[str, Any]]:
     the combined u(T) in newton, ``largest`` of each row; components below half a percent everywhere are left out."""
     if study.budget is None or study.budget.empty:
         return []
-    order = study_lookup.sample_numbers(study)
+    order = findings.sample_numbers(study)
     parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
     return [_budget_table(regime, part, list(order)) for regime, part in parts if not part.empty]
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings
 from tribo.records import PA_PER_KPA, Campaign, Pattern, Study, Test
 from tribo.report.provenance import Provenance, file_hash
 from tribo.wording.numerals import counted, joined, significant
@@ -53,7 +53,7 @@ def conditions(study: Study) -> list[Condition]:
 
 def _bodies(study: Study, tests: list[Test]) -> Iterator[Condition]:
     campaign = study.ingested.campaign
-    samples = [s for s in study_lookup.sample_numbers(study) if any(t.sample == s for t in tests)]
+    samples = [s for s in findings.sample_numbers(study) if any(t.sample == s for t in tests)]
     yield Condition("Moving body, material", campaign.material or NOT_RECORDED, term="MaterialName")
     yield Condition("Counterface, material", campaign.counterface or NOT_RECORDED, term="MaterialName")
     yield Condition("Surface geometry", "; ".join(f"{s}: {_geometry(campaign.samples[s])}" for s in samples))
@@ -142,7 +142,7 @@ def _range(values: np.ndarray) -> str:
 def _repeats(tests: list[Test]) -> str:
     if not tests:
         return "0"
-    levels = study_lookup.load_levels(np.array([t.normal_load_N for t in tests]))
+    levels = findings.load_levels(np.array([t.normal_load_N for t in tests]))
     cells: dict[tuple[str, float], int] = {}
     for test, level in zip(tests, levels.tolist(), strict=True):
         cells[test.sample, level] = cells.get((test.sample, level), 0) + 1

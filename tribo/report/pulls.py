@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from tribo.comparison import study_lookup
-from tribo.comparison.study_lookup import ODD_SCORE, standings
+from tribo.comparison import findings
+from tribo.comparison.findings import ODD_SCORE, standings
 from tribo.figures.one_pull import thin_trace
 from tribo.records import FloatArray, Override, Pull, Study, Test, Trace
 from tribo.report.shell import script_json
@@ -65,7 +65,7 @@ def doubted_s(trace: Trace, pull: Pull) -> dict[float, tuple[str, ...]]:
 def load_labels(study: Study) -> dict[str, str]:
     """The load level of every test in newton, as it is filtered by."""
     tests = study.ingested.campaign.tests
-    levels = study_lookup.load_levels(np.array([t.normal_load_N for t in tests], float)) if tests else np.empty(0)
+    levels = findings.load_levels(np.array([t.normal_load_N for t in tests], float)) if tests else np.empty(0)
     return {t.test_id: significant(float(level)) for t, level in zip(tests, levels, strict=True)}
 
 

@@ -16,8 +16,7 @@ import numpy as np
 import pandas as pd
 
 from tribo import outputs
-from tribo.comparison.findings import ratios_of
-from tribo.comparison.study_lookup import all_set_aside
+from tribo.comparison.findings import all_set_aside, ratios_of
 from tribo.records import Pull, SetAside, Study, Test
 from tribo.vocabulary import label_with_unit
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from tribo.comparison import study_lookup
-from tribo.comparison.study_lookup import all_set_aside
+from tribo.comparison import findings
+from tribo.comparison.findings import all_set_aside
 from tribo.diagnostics.verdict import Verdict
 from tribo.display import displayed
 from tribo.mechanisms import MECHANISMS
@@ -62,7 +62,7 @@ def card_of(study: Study, verdict: Verdict | None) -> Card:
     campaign, used = study.ingested.campaign, study.ingested.pulls
     tests = [t for t in campaign.tests if t.test_id in used]
     aside, specimens = len(all_set_aside(study)), len(specimens_of(campaign, tests))
-    fits = [fit for s in study_lookup.sample_numbers(study) for r in REGIMES if (fit := _law(study, s, r)) is not None]
+    fits = [fit for s in findings.sample_numbers(study) for r in REGIMES if (fit := _law(study, s, r)) is not None]
     return Card(
         sentence=friction_sentence(study) if verdict is None else verdict.sentence,
         meanings=meanings(verdict),
@@ -108,8 +108,8 @@ def _largest(fit: LawFit) -> str:
 
 def _counts(study: Study, used: int, aside: int, specimens: int) -> str:
     tests = [t for t in study.ingested.campaign.tests if t.test_id in study.ingested.pulls]
-    samples = [s for s in study_lookup.sample_numbers(study) if any(t.sample == s for t in tests)]
-    levels = np.unique(study_lookup.load_levels(np.array([t.normal_load_N for t in tests], float)))
+    samples = [s for s in findings.sample_numbers(study) if any(t.sample == s for t in tests)]
+    levels = np.unique(findings.load_levels(np.array([t.normal_load_N for t in tests], float)))
     where = f"{counted(specimens, 'specimen')}, {counted(len(samples), 'sample')} ({joined(samples)})"
     loads = loads_in_words(levels.tolist()) if used else ""
     left_out = f"{counted(aside, 'test')} set aside" if aside else "no test set aside"

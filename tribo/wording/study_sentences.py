@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tribo.comparison import findings, study_lookup
-from tribo.comparison.findings import Agreement, Ranking, Verdict
-from tribo.comparison.study_lookup import all_set_aside, shown
+from tribo.comparison import findings
+from tribo.comparison.findings import Agreement, Ranking, Verdict, all_set_aside, shown
 from tribo.records import PA_PER_KPA, REGIMES, Campaign, LawFit, Override, Pull, Study, Test
 from tribo.vocabulary import label_with_unit
 from tribo.wording.numerals import counted, joined, loads_in_words, p_text, percent, significant, span, with_uncertainty
@@ -51,10 +50,10 @@ def what_was_measured(study: Study) -> str:
     campaign, used = study.ingested.campaign, study.ingested.pulls
     aside = len(all_set_aside(study))
     tests = [t for t in campaign.tests if t.test_id in used]
-    samples = [s for s in study_lookup.sample_numbers(study) if any(t.sample == s for t in tests)]
+    samples = [s for s in findings.sample_numbers(study) if any(t.sample == s for t in tests)]
     specimens = specimens_of(campaign, tests)
     loads = np.array([t.normal_load_N for t in tests])
-    levels = np.unique(study_lookup.load_levels(loads))
+    levels = np.unique(findings.load_levels(loads))
     pressure = ""
     if campaign.has_area:
         lowest, highest = (significant(n / campaign.area_m2 / PA_PER_KPA) for n in (levels[0], levels[-1]))
@@ -73,7 +72,7 @@ def specimens_of(campaign: Campaign, tests: Iterable[Test]) -> set[tuple[str, st
 
 def flat_law(study: Study) -> list[str]:
     """The measured law of the flat sample, one sentence per regime."""
-    flat = study_lookup.flat_sample(study)
+    flat = findings.flat_sample(study)
     fits = [(regime, study.fits.of(flat, regime)) for regime in REGIMES]
     return [
         f"The {regime} friction of the flat sample {flat} follows T = μN + {'τ₀A' if fit.has_area else 'T₀'} with "
@@ -334,13 +333,13 @@ def friction_sentences(study: Study) -> dict[str, list[str]]:
 
 def _samples(study: Study) -> Iterator[str]:
     table = study.ingested.table()
-    for sample in study_lookup.sample_numbers(study):
+    for sample in findings.sample_numbers(study):
         for regime in REGIMES:
             part = table[(table["sample"] == sample) & np.isfinite(table[f"{regime}_N"]) & (table["normal_load_N"] > 0)]
             if part.empty:
                 continue
             ratio = (part[f"{regime}_N"] / part["normal_load_N"]).to_numpy(float)
-            loads = np.unique(study_lookup.load_levels(part["normal_load_N"].to_numpy(float)))
+            loads = np.unique(findings.load_levels(part["normal_load_N"].to_numpy(float)))
             at = loads_in_words(loads.tolist())
             spread = f", standard deviation {significant(float(ratio.std(ddof=1)), 2)}" if ratio.size > 1 else ""
             said = f"mean T/N = {significant(float(ratio.mean()))}{spread}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tribo.comparison import findings, study_lookup
+from tribo.comparison import findings
 from tribo.diagnostics.planning import Finding, Plan
 from tribo.diagnostics.verdict import Verdict
 from tribo.mechanisms import mechanism
@@ -32,10 +32,10 @@ def table2_text(study: Study) -> str:
 def _regime_block(study: Study, regime: Regime, load: float) -> str:
     simulated = study.comparison.simulated if study.comparison is not None else ()
     rows = []
-    for sample in study_lookup.sample_numbers(study):
+    for sample in findings.sample_numbers(study):
         measured, model = (
             study.fits.of(sample, regime),
-            study_lookup.fit_of(simulated, sample, regime),
+            findings.fit_of(simulated, sample, regime),
         )
         if measured is not None:
             counts = (str(measured.n_specimens), str(measured.n_tests))
@@ -79,7 +79,7 @@ def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
 def summary_text(study: Study) -> str:
     """The measurements and the agreement with the model, in the words of the report, one sentence per line."""
     agreements = findings.agreements(study)
-    lines = [study_words.what_was_measured(study), *study_words.in_short(agreements, study_lookup.flat_sample(study))]
+    lines = [study_words.what_was_measured(study), *study_words.in_short(agreements, findings.flat_sample(study))]
     lines += [study_words.ranking_sentence(r) for r in findings.rankings(study)]
     lines += study_words.direction_sentences(findings.direction_ratios(study))
     return "\n".join(lines)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings
 from tribo.records import Pattern
 
 
 def test_loads_within_two_percent_are_one_level() -> None:
     loads = np.array([1.00, 0.5, 1.01, 2.0, 0.502])
-    assert study_lookup.load_levels(loads) == pytest.approx([1.005, 0.501, 1.005, 2.0, 0.501])
-    assert study_lookup.load_levels(np.array([])).shape == (0,)
+    assert findings.load_levels(loads) == pytest.approx([1.005, 0.501, 1.005, 2.0, 0.501])
+    assert findings.load_levels(np.array([])).shape == (0,)
 
 
 @pytest.mark.parametrize(
@@ -25,4 +25,4 @@ def test_loads_within_two_percent_are_one_level() -> None:
     ],
 )
 def test_a_pattern_is_anisotropic_if_its_cavities_or_spacing_are(pattern: Pattern, expected: bool) -> None:
-    assert study_lookup.is_anisotropic(pattern) is expected
+    assert findings.is_anisotropic(pattern) is expected
