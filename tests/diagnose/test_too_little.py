@@ -13,8 +13,7 @@ from support.campaigns import written
 import tribo
 from tribo.diagnostics.verdict import Verdict
 from tribo.records import Ingested
-from tribo.wording.card import card_of
-from tribo.wording.terminal import card_text
+from tribo.wording.card import card_of, card_text
 
 from .synthetic import hidden
 

@@ -17,8 +17,7 @@ from tribo.diagnostics.verdict import Cause, Estimate, Verdict
 from tribo.errors import Problem
 from tribo.mechanisms import MECHANISMS
 from tribo.records import LawFit, SetAside, Study
-from tribo.wording.card import Card, card_law, card_of, to_know
-from tribo.wording.terminal import card_text, verdict_text
+from tribo.wording.card import Card, card_law, card_of, card_text, to_know, verdict_text
 from tribo.wording.verdict_sentences import why_next, worded
 
 LAYER: dict[str, Any] = {

@@ -12,8 +12,8 @@ from tribo.comparison import findings
 from tribo.comparison.findings import Agreement, LoadRatio, Ranking
 from tribo.records import REGIMES, LawFit, Study
 from tribo.wording import study_sentences as wording
+from tribo.wording.card import summary_text, table2_text
 from tribo.wording.numerals import loads_in_words, percent, significant, span, with_uncertainty
-from tribo.wording.terminal import summary_text, table2_text
 
 
 def ratio(value: float, low: float, high: float, load: float = 1.0) -> LoadRatio:

@@ -123,8 +123,8 @@ def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> N
     from tribo.campaign import open_campaign
     from tribo.diagnostics import plan_design
     from tribo.lawsearch.known_laws import plan_law, read_law
+    from tribo.wording.card import plan_text, why_not_found
     from tribo.wording.law_sentences import planned_law_sentence
-    from tribo.wording.terminal import plan_text, why_not_found
 
     law = read_law(law_file) if law_file is not None else None
     with open_campaign(campaign, measured=False) as opened:

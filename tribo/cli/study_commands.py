@@ -181,8 +181,7 @@ def diagnose(
     from tribo.campaign import open_campaign
     from tribo.report import write_until
     from tribo.report.write import Drawing
-    from tribo.wording.card import card_of
-    from tribo.wording.terminal import card_text, verdict_text
+    from tribo.wording.card import card_of, card_text, verdict_text
 
     chosen = stages.StudyOptions(kept=out / KEPT, **options)
     if dry_run:
@@ -211,8 +210,8 @@ def _diagnose_published(console: Console, out: Path, seed: int) -> int:
     from tribo.files import data_dir
     from tribo.report.provenance import provenance_of_table
     from tribo.report.without_study import write_published
+    from tribo.wording.card import verdict_text
     from tribo.wording.law_sentences import across_record, across_sentence
-    from tribo.wording.terminal import verdict_text
     from tribo.wording.verdict_sentences import worded
 
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
@@ -259,7 +258,7 @@ def demo(console: Console, out: Path, **options: Any) -> int:
     """
     from tribo.files import data_dir
     from tribo.report.without_study import SECOND, write_demo_page
-    from tribo.wording.terminal import card_text
+    from tribo.wording.card import card_text
 
     cards: list[Card] = []
 
@@ -344,7 +343,7 @@ def _conclude(
     console: Console, study: Study, out: Path, verdict: Verdict | None = None, card: Card | None = None
 ) -> int:
     """Print the results and the tests set aside; return the exit status."""
-    from tribo.wording.terminal import card_text, summary_text, table2_text, verdict_text
+    from tribo.wording.card import card_text, summary_text, table2_text, verdict_text
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()

@@ -18,9 +18,8 @@ from tribo.report.crate import conditions
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import pull_cards
 from tribo.wording import study_sentences as wording
-from tribo.wording.card import Card, card_of
+from tribo.wording.card import Card, card_of, fit_cells
 from tribo.wording.numerals import joined, significant
-from tribo.wording.terminal import fit_cells
 from tribo.wording.verdict_sentences import verdict_in_words
 
 # the first that there is shows what the card says
