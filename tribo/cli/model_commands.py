@@ -236,8 +236,8 @@ _RUNS = (
     click.option("--engine", help="Engine: fast or reference.  [default: fast]"),
     click.option(
         "--reading", type=click.Choice(["text", "berardo2019"]),
-        help="Reading of the paper where its text leaves a choice: text, its letter; berardo2019, the one closest to "
-        "its simulated column of Table 2.  [default: text]",
+        help="How the paper is understood where its text leaves a choice: text, as it is written; berardo2019, as it "
+        "comes closest to its simulated column of Table 2.  [default: text]",
     ),
 )  # fmt: skip
 
@@ -464,8 +464,13 @@ PATTERNS = {
 @click.option("--pattern", type=click.Choice(list(PATTERNS)), required=True, help="Family of patterns.")
 @click.option("--pillars", is_flag=True, help="The shapes touch, instead of being cavities.")
 @click.option("--vary", default="diameter,pitch", show_default=True, help="The two lengths to vary.")
-@click.option("--size", nargs=2, type=float, default=(5.0, 25.0), show_default=True, help="Bounds in um.")
-@click.option("--pitch", nargs=2, type=float, default=(12.0, 40.0), show_default=True, help="Bounds in um.")
+@click.option(
+    "--size", nargs=2, type=float, default=(5.0, 25.0), show_default=True, help="Least and largest size of a shape in um."
+)
+@click.option(
+    "--pitch", nargs=2, type=float, default=(12.0, 40.0), show_default=True,
+    help="Least and largest distance between the centres of neighbouring shapes in um.",
+)  # fmt: skip
 @click.option("--pressure", "pressure_kPa", type=float, default=10.0, show_default=True, help="Pressure in kPa.")
 @click.option("--points", type=click.IntRange(3, 40), default=10, show_default=True, help="Values of each length.")
 @click.option("--smallest-wall", type=float, default=2.0, show_default=True, help="Smallest wall in um.")

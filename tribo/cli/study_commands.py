@@ -80,7 +80,8 @@ def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
     """Fit mu and tau0 of every sample.
 
-    Writes fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
+    The law is T = mu N + tau0 A: friction force T, normal load N, nominal contact area A. Writes
+    fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
     """
     return _run_stages(console, campaign, out, "fit", dry_run, **options)
 

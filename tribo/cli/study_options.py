@@ -124,8 +124,8 @@ WEIGHTS = click.option(
     type=click.Choice(["relative", "ratio", "force", "repeats"]),
     default="relative",
     show_default=True,
-    help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
-    "estimated from repeated tests (repeats).",
+    help="Scatter of the friction force T that is assumed equal at all loads N: in percent of T (relative), of T/N "
+    "(ratio) or of T (force); or estimated from repeated tests (repeats).",
 )
 LAWS = click.option(
     "--laws", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",

@@ -1,7 +1,7 @@
 """The card on top of a report, and what a terminal shows: the answer in one sentence, with what it rests on.
 
-The card is made once, then written everywhere: page, PDF, index page, terminal and ``--json`` take their words from it. A
-terminal shows the table of fitted laws, the agreement with the model, a verdict and a planned design as well.
+The card is made once, then written everywhere: page, PDF, index page, terminal and ``--json`` take their words from it.
+A terminal shows the table of fitted laws, the agreement with the model, a verdict and a planned design as well.
 """
 
 from __future__ import annotations
