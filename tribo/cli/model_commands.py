@@ -465,8 +465,9 @@ PATTERNS = {
 @click.option("--pillars", is_flag=True, help="The shapes touch, instead of being cavities.")
 @click.option("--vary", default="diameter,pitch", show_default=True, help="The two lengths to vary.")
 @click.option(
-    "--size", nargs=2, type=float, default=(5.0, 25.0), show_default=True, help="Least and largest size of a shape in um."
-)
+    "--size", nargs=2, type=float, default=(5.0, 25.0), show_default=True,
+    help="Least and largest size of a shape in um.",
+)  # fmt: skip
 @click.option(
     "--pitch", nargs=2, type=float, default=(12.0, 40.0), show_default=True,
     help="Least and largest distance between the centres of neighbouring shapes in um.",
