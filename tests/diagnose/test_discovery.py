@@ -190,7 +190,7 @@ def test_a_campaign_without_misfit_is_searched_and_none_is_found(quiet: Diagnosi
 
 
 def test_a_law_that_no_contrast_had_shown_is_a_misfit(found: Discovery, quiet: Diagnosis) -> None:
-    v = with_misfits(quiet.verdict, found)
+    v = with_misfits(quiet.verdict, found, (), quiet.baseline)
     assert v.verdict == "unknown"
     assert [(m.observable, m.covariate) for m in v.misfits] == [("sliding", "temperature_C")]
     assert v.misfits[0].low < v.misfits[0].effect_percent < v.misfits[0].high
@@ -201,7 +201,7 @@ def test_a_law_that_no_contrast_had_shown_is_a_misfit(found: Discovery, quiet: D
 
 def test_a_law_beside_a_cause_leaves_it_a_part_of_the_answer(found: Discovery, quiet: Diagnosis) -> None:
     cause = Cause("suction", 1.0, {})
-    v = with_misfits(replace(quiet.verdict, verdict="named", causes=(cause,)), found)
+    v = with_misfits(replace(quiet.verdict, verdict="named", causes=(cause,)), found, (), quiet.baseline)
     assert (v.verdict, v.causes) == ("partly", (cause,))
     assert "A misfit remains beyond chance" in worded(v).text
 

@@ -6,6 +6,7 @@ import re
 import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from on_the_command_line import run
 
@@ -66,3 +67,19 @@ def test_what_cannot_be_drawn_again_is_said(small_report: Path, tmp_path: Path) 
     refused = run("figures", small_report, "-o", small_report / "figures")
     assert refused.exit_code == 1
     assert "there already" in refused.output
+
+
+def test_one_figure_that_fails_is_named_and_the_others_are_drawn(small_report: Path, tmp_path: Path) -> None:
+    (tmp_path / "figures").mkdir()
+    for name in ("fig4", "fig6", "agreement"):
+        shutil.copy(small_report / "figures" / f"{name}.csv", tmp_path / "figures")
+    fig6 = tmp_path / "figures" / "fig6.csv"
+    table = pd.read_csv(fig6, dtype=str)
+    table.drop(columns="sample").to_csv(fig6, index=False)
+    (tmp_path / "figures" / "fig4.csv").write_text("sample,normal_load_N\nF,much\n", encoding="utf-8")
+    result = run("figures", tmp_path, "-o", tmp_path / "drawn")
+    assert result.exit_code == 1
+    assert "fig6.csv" in result.output
+    assert "fig4.csv" in result.output
+    assert "agreement.csv" not in result.output
+    assert {path.name for path in (tmp_path / "drawn").iterdir()} == {"agreement.svg", "agreement.pdf"}

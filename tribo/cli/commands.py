@@ -15,6 +15,7 @@ from tribo.cli.model_commands import design, map_family, simulate
 from tribo.cli.setup_commands import init
 from tribo.cli.study_commands import compare, compare_reports, demo, diagnose, discover, fit, ingest, predict, report
 from tribo.cli.study_options import CAMPAIGN, corrected, reading_options
+from tribo.errors import CampaignError
 from tribo.user_text import did_you_mean
 
 
@@ -100,9 +101,11 @@ def figures(
     if wrong := next((old for old, sign, new in pairs if not (old and sign and new)), None):
         raise click.BadParameter(f"{wrong!r} is not of the form SAMPLE=NAME", param_hint="--names")
     renamed = {old.strip(): new.strip() for old, _, new in pairs}
-    written = write_redrawn(out, to, width_mm, renamed, console.force)
+    written, failed = write_redrawn(out, to, width_mm, renamed, console.force)
     listed = "\n".join(path.name for path in written)
     console.result({"to": str(to), "files": [path.name for path in written]}, f"{listed}\n{len(written)} files in {to}")
+    if failed:
+        raise CampaignError(failed)
 
 
 @main.command()

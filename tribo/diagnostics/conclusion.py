@@ -311,7 +311,7 @@ def conclude(
         gain=gained,
         set_aside=o.set_aside,
         next_test=next_test_of(
-            named, outcome, misfits, o.conditions, [e.mechanism for e in barred if e.why == "hidden"]
+            named, outcome, misfits, model, [e.mechanism for e in barred if e.why == "hidden"]
         ),
         smallest_effects=_smallest_effects(effects, screened.chance, {e.mechanism for e in barred}, level),
         shows=AgainstModel(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import block_diag
 
 from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named, weights_of
@@ -32,6 +33,9 @@ FOUND = 3.6  # strength that chance reaches in one campaign of a hundred, over a
 NINE_IN_TEN = FOUND + 1.28
 HOURS_PER_PULL = 7.0 / 60.0
 PULLS = 18
+NARROWER = 0.8  # of the width of an interval: what further pulls leave of it
+MOST_PULLS = 72  # one long day
+PLACES = {1: np.array([-1.0, 0.0, 1.0]), 2: np.array([-1.0, 1.0])}  # of a column varied alone, of two together
 CERTAIN = 0.99  # share of a cause beside its rivals from which a test between them would tell next to nothing
 CHOSEN: dict[str, Literal["ratio", "interval"]] = {  # conditions that can be set, with their scale
     "speed_m_s": "ratio", "hold_s": "ratio", "temperature_C": "interval", "humidity_pct": "interval",
@@ -169,7 +173,7 @@ def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: P
 
 
 def next_test_of(
-    named: Named | None, outcome: Outcome, misfits: Sequence[Misfit], conditions: Conditions, hidden: Collection[str]
+    named: Named | None, outcome: Outcome, misfits: Sequence[Misfit], model: ModelFit, hidden: Collection[str]
 ) -> NextTest | None:
     """A test that distinguishes tied mechanisms, confirms a cause against the next best, or narrows or widens the
     search; ``hidden`` are the mechanisms that the errors of the model for the patterns hide.
@@ -177,10 +181,11 @@ def next_test_of(
     Samples that differ for no known reason were measured already: what can tell more is what the campaign could not
     test, on the sample that differs most.
     """
+    conditions = model.setup.observations.conditions
     if outcome == "unknown" and misfits and misfits[0].covariate == "sample":
-        return widening_test(conditions, misfits[0].sample, hidden) or first_test_of("sample")
+        return widening_test(conditions, misfits[0].sample, hidden) or first_test_of(model, "sample")
     if outcome == "unknown":
-        return first_test_of(misfits[0].covariate) if misfits else None
+        return first_test_of(model, misfits[0].covariate, sample=misfits[0].sample) if misfits else None
     if named is None or not named.causes:
         return widening_test(conditions) if outcome == "no_misfit" else None
     for alike in named.causes:
@@ -199,7 +204,7 @@ def settling_test(cause: CauseCandidate) -> NextTest | None:
     column = cause.acting.mechanism.column(cause.acting.choice)
     alone = column in ("specimen_run", *cause.fit.setup.observations.conditions.columns)
     tests = confirming_test(cause), _measuring(cause, own), _removing(cause, own)
-    return next(filter(None, tests), first_test_of(column) if alone else None)
+    return next(filter(None, tests), first_test_of(cause.fit, column) if alone else None)
 
 
 def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
@@ -301,12 +306,51 @@ def _further_values(recorded: FloatArray, scale: Literal["ratio", "interval"]) -
     return np.array([float(f"{value:.2g}") for value in (np.exp(further) if scale == "ratio" else further)])
 
 
-def first_test_of(*covariates: str) -> NextTest:
-    """For a misfit that follows a column, or two together, and no mechanism: vary that alone, or every pair of ends."""
-    design: dict[str, Any] = {"pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
+def first_test_of(f: ModelFit, *covariates: str, sample: str = "") -> NextTest:
+    """For a misfit that follows a column, or two together, and no mechanism: vary that alone, or every pair of ends, on
+    the ``sample`` it is about, if it is about one; so many pulls that its size is known more closely than before.
+    The fit holds nothing that follows these columns."""
+    pulls = narrowing_pulls(f, covariates, sample)
+    design: dict[str, Any] = {"pulls": pulls, "hours": pulls * HOURS_PER_PULL}
+    if sample:
+        design["sample"] = sample
     if len(covariates) > 1:
         return NextTest("factorial", covariates, design | {"vary": list(covariates)})
     return NextTest("vary one column", covariates, design | {"covariate": covariates[0]})
+
+
+def narrowing_pulls(f: ModelFit, columns: Sequence[str], sample: str = "") -> int:
+    """How many pulls of one sample, equally shared between the ends (and the middle) of the range of one or two
+    columns, narrow the interval of an effect of these columns to NARROWER of its width.
+
+    The information of the campaign is that of a straight line over the range, all that is fitted beside it taken out;
+    that of the further pulls rests on their scatter alone, their mean being that of another day.
+    """
+    c = f.setup.observations.conditions
+    course = np.prod([_over_range(c, name) for name in columns], axis=0)
+    known = float(np.sum(f.cleared(np.repeat(course[:, None], 2, axis=1)[:, :, None])[0] ** 2))
+    rows = np.isin(c.sample, [sample]) if sample in c.sample else np.ones(len(c.sample), bool)
+    repeat = f.noise.per_test(f.setup)[rows].mean(axis=0)
+    each = float(np.linalg.inv(repeat).sum()) * float(np.mean(PLACES[min(len(columns), 2)] ** 2))
+    needed = known * (NARROWER**-2 - 1.0) / each
+    return int(np.clip(6 * np.ceil(needed / 6), PULLS, MOST_PULLS))
+
+
+def _over_range(c: Conditions, name: str) -> FloatArray:
+    """A column from -1 at its lowest to 1 at its highest value, 0 where it is not recorded; of names, 1 for the first
+    and -1 for all others."""
+    cells = c.columns[name] if name in c.columns else getattr(c, name, np.zeros(0))
+    if len(cells) != len(c.sample):
+        return np.zeros(len(c.sample))
+    x = _numbers(cells)
+    if not np.isfinite(x).any():
+        return np.where(cells == np.unique(cells)[0], 1.0, -1.0)
+    low, high = np.nanmin(x), np.nanmax(x)
+    return np.asarray(np.nan_to_num((2.0 * x - low - high) / max(high - low, 1e-300)))
+
+
+def _numbers(cells: np.ndarray) -> FloatArray:
+    return np.asarray(pd.to_numeric(pd.Series(cells), errors="coerce"), float)
 
 
 def more_tests(lack: TooLittle) -> NextTest:

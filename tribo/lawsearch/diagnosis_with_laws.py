@@ -75,7 +75,8 @@ def with_laws(
         contrast.column for contrast, p in zip(left.contrasts, left.p, strict=True)
         if p < level and contrast.kind != "mechanism"
     }  # fmt: skip
-    verdict = with_misfits(without_causes(d.verdict, gone, idle_beside), found, explained_by_laws - open_columns)
+    left_over = without_causes(d.verdict, gone, idle_beside)
+    verdict = with_misfits(left_over, found, explained_by_laws - open_columns, with_known)
     open_columns -= explained_by_laws
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
@@ -84,11 +85,12 @@ def with_laws(
     )  # fmt: skip
     next_test = verdict.next_test
     alike = [law.ties if law.levels else (law.law, *law.ties) for law in found.laws]
+    law = found.laws[0].law if found.laws else None
     ties = [(first, second) for first, second, *_ in (laws for laws in alike if len(laws) > 1)]
     if ties and not verdict.equivalent:
         next_test = separating_test(*ties[0], model.setup.observations.conditions)
-    elif found.laws and not any(layer.kind == "cause" for layer in layers):
-        next_test = first_test_of(*found.laws[0].law.columns)
+    elif law is not None and not any(layer.kind == "cause" for layer in layers):
+        next_test = first_test_of(with_known, *law.columns, sample=law.sample)
     shows = replace(verdict.shows, within_chance=bool(left.p.min() >= level))
     return replace(d, laws=found, verdict=replace(verdict, layers=layers, next_test=next_test, shows=shows))
 
@@ -154,8 +156,9 @@ def with_levels_of_causes(v: Verdict, model: ModelFit) -> Verdict:
     return replace(v, layers=layers)
 
 
-def with_misfits(v: Verdict, found: Discovery, told: Collection[str] = ()) -> Verdict:
-    """The verdict with the laws found as its misfits, in place of those of the columns that they ``told`` all about."""
+def with_misfits(v: Verdict, found: Discovery, told: Collection[str], before: ModelFit) -> Verdict:
+    """The verdict with the laws found as its misfits, in place of those of the columns that they ``told`` all about;
+    ``before`` is the model without these laws."""
     if not found.laws:
         return v
     outcome = AS_MISFIT.get(v.verdict, v.verdict)
@@ -169,7 +172,7 @@ def with_misfits(v: Verdict, found: Discovery, told: Collection[str] = ()) -> Ve
         misfits.append(Misfit(f.law.regime, f.law.sample, name, value, f.p, low=low, high=high, shows=f))
     if outcome == v.verdict:
         return replace(v, misfits=(*misfits, *kept))
-    next_test = v.next_test if v.equivalent else first_test_of(misfits[0].covariate)
+    next_test = v.next_test if v.equivalent else first_test_of(before, misfits[0].covariate)
     return replace(v, verdict=outcome, misfits=(*kept, *misfits), next_test=next_test)
 
 

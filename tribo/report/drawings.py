@@ -310,8 +310,9 @@ _WHOLE = re.compile(r"-?\d+")
 
 def redrawn(
     out: Path, width_mm: float = style.PAGE_MM, names: Mapping[str, str] | None = None
-) -> dict[str, dict[str, bytes]]:
-    """The figures of an output folder as SVG and PDF with text that can be edited, by their name and ending.
+) -> tuple[dict[str, dict[str, bytes]], list[Problem]]:
+    """The figures of an output folder as SVG and PDF with text that can be edited, by their name and ending; and why
+    others of them could not be drawn.
 
     Parameters
     ----------
@@ -335,8 +336,14 @@ def redrawn(
     folder = out / "figures"
     paths = {path.stem: path for path in (found_in(folder, "*.csv") if folder.is_dir() else ()) if path.stem in known}
     texts = {name: text_of(paths[name]) for name in known if name in paths}
-    numbers = {name: _numbers(text) for name, text in texts.items() if text.strip()}  # empty where it was not drawn
-    if not numbers:
+    numbers, failed = {}, []
+    for name, text in texts.items():
+        if text.strip():  # empty where it was not drawn
+            try:
+                numbers[name] = _numbers(text)
+            except ValueError as why:
+                failed.append(_not_drawn(paths[name], why))
+    if not numbers and not failed:
         what = "this folder holds no figures of tribo report, compare or diagnose"
         raise CampaignError(Problem("no_figures", what, file=str(out)))
     named = [table[column] for table in numbers.values() for column in ("sample", "row") if column in table]
@@ -350,10 +357,22 @@ def redrawn(
         for name, table in numbers.items():
             if table.empty:
                 continue
-            figure = known[name].draw(_renamed(table, names or {}))
-            svg = style.as_svg(figure, {"Creator": "tribo", "Title": known[name].title})
-            found[name] = {"svg": svg.encode(), "pdf": style.as_pdf(figure, {"Title": known[name].title})}
-    return found
+            try:
+                figure = known[name].draw(_renamed(table, names or {}))
+                svg = style.as_svg(figure, {"Creator": "tribo", "Title": known[name].title})
+                pdf = style.as_pdf(figure, {"Title": known[name].title})
+            except (ArithmeticError, LookupError, TypeError, ValueError) as why:
+                failed.append(_not_drawn(paths[name], why))
+                continue
+            found[name] = {"svg": svg.encode(), "pdf": pdf}
+    return found, failed
+
+
+def _not_drawn(path: Path, why: Exception) -> Problem:
+    """Numbers of a figure that a user changed so that it cannot be drawn."""
+    found = f"{type(why).__name__}: {why}"
+    return Problem("not_drawn", "this figure cannot be drawn from its numbers", file=str(path), found=found,
+                   allowed="the numbers that tribo wrote; make the report again")  # fmt: skip
 
 
 def write_redrawn(
@@ -362,8 +381,9 @@ def write_redrawn(
     width_mm: float = style.PAGE_MM,
     names: Mapping[str, str] | None = None,
     force: bool = False,
-) -> list[Path]:
-    """Write the figures of :func:`redrawn` to the folder ``to``, as NAME.svg and NAME.pdf.
+) -> tuple[list[Path], list[Problem]]:
+    """Write the figures of :func:`redrawn` to the folder ``to``, as NAME.svg and NAME.pdf; and why others could not be
+    drawn.
 
     Raises
     ------
@@ -376,12 +396,9 @@ def write_redrawn(
     if there and not force:
         what, allowed = "a file of this name is there already", "a folder without figures, or --force"
         raise CampaignError(Problem("file_there", what, file=str(there[0]), allowed=allowed))
-    contents = {
-        to / f"{name}.{ending}": content
-        for name, endings in redrawn(out, width_mm, names).items()
-        for ending, content in endings.items()
-    }
-    return [write_bytes(path, content) for path, content in contents.items()]
+    found, failed = redrawn(out, width_mm, names)
+    contents = {to / f"{name}.{end}": content for name, ends in found.items() for end, content in ends.items()}
+    return [write_bytes(path, content) for path, content in contents.items()], failed
 
 
 def _numbers(text: str) -> pd.DataFrame:

@@ -15,7 +15,7 @@ from tribo.lawsearch.known_laws import SHOWS, PlannedLaw, Untested, Validation
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.search import Discovery
 from tribo.vocabulary import COLUMNS, in_words
-from tribo.wording.numerals import p_text
+from tribo.wording.numerals import general, interval, p_text, signed
 
 NAMED = 3  # tied laws that are written out in a sentence
 WHERE = {
@@ -59,9 +59,9 @@ def curve_sentence(law: WrittenLaw, places: Mapping[str, Estimate]) -> str:
 def each_value(levels: Mapping[str, Estimate], unit: str = "", to: str = "the mean over these values") -> str:
     """ "+5 % (+2 to +8 %) at 0.05 mm/s, ...", relative to what."""
     each = [
-        f"{e.value:+.0f} % ({e.low:+.0f} to {e.high:+.0f} %) at {value} {unit}".rstrip() for value, e in levels.items()
+        f"{signed(e.value)} % ({interval(e.low, e.high)}) at {value} {unit}".rstrip() for value, e in levels.items()
     ]
-    return f"{', '.join(each)}, each relative to {to}, with 90 % intervals".replace("-", "−")
+    return f"{', '.join(each)}, each relative to {to}, with 90 % intervals"
 
 
 def size_sentence(
@@ -69,7 +69,7 @@ def size_sentence(
 ) -> str:
     """The same of any law with these parameters, without evidence and full stop."""
     value, low, high = effect_percent
-    size = f"{value:+.0f} %, 90 % interval {low:+.0f} to {high:+.0f} %"
+    size = f"{signed(value)} %, 90 % interval {interval(low, high)}"
     if law.shapes[0].kind == "levels":
         return f"{subject(law)} changes with {in_words(law.columns[0])} from value to value by up to {size}"
     if law.shapes[0].kind == "curve":
@@ -108,7 +108,8 @@ def _where(law: WrittenLaw, parameters: Mapping[str, Estimate]) -> str:
     if s.kind in ("optimum", "log optimum", "hump"):
         place = parameters["place"]
         factor, _ = _readable(s.column)
-        near = f"{_value(s, place.value)} (90 % interval {factor * place.low:.4g} to {factor * place.high:.4g})"
+        low, high = general(factor * place.low), general(factor * place.high)
+        near = f"{_value(s, place.value)} (90 % interval {low} to {high})"
         return f"near {in_words(s.column)} = {near} than far from it"
     how = {"log": ", in proportion to its logarithm", "saturating": ", approaching a limit"}.get(s.kind, "")
     return f"at {in_words(s.column)} = {_value(s, s.high)} than at {_value(s, s.low)}{how}"
@@ -120,7 +121,7 @@ def _wave(s: Shape) -> str:
 
 def _value(s: Shape, x: float) -> str:
     factor, unit = _readable(s.column)
-    return f"{factor * x:.4g} {unit}".rstrip()
+    return f"{general(factor * x)} {unit}".rstrip()
 
 
 def _readable(column: str) -> tuple[float, str]:
@@ -214,7 +215,7 @@ def law_test(difference: Difference, law: WrittenLaw, other: WrittenLaw, design:
         return vary if days else f"Pull at the corners of the ranges of {words}"
     column = law.columns[0]
     factor, unit = _readable(column)
-    return f"Pull at {in_words(column)} = {factor * design[column]:.4g} {unit}".rstrip()
+    return f"Pull at {in_words(column)} = {general(factor * design[column])} {unit}".rstrip()
 
 
 def across_sentence(found: Sequence[LawsAcross]) -> str:

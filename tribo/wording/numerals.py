@@ -78,6 +78,16 @@ def signed(value: float) -> str:
     return f"{value:+.0f}".replace("-", "−") if math.isfinite(value) else "–"
 
 
+def interval(low: float, high: float) -> str:
+    """ "−60 to −54 %": the ends of an interval of a percentage."""
+    return f"{signed(low)} to {signed(high)} %"
+
+
+def general(value: float) -> str:
+    """ "−6.13", "25": up to four digits, with a true minus sign."""
+    return f"{value:.4g}".replace("-", "−")
+
+
 def _signed(text: str) -> str:
     return text.replace("-", "−")
 
