@@ -67,7 +67,7 @@ def test_a_period_of_the_time_is_told_in_hours() -> None:
 
 def test_a_law_that_lowers_friction_has_a_negative_size_and_interval() -> None:
     law = WrittenLaw((Shape("linear", "humidity_pct", 30.0, 60.0),))
-    assert "Friction is lower (-21 %, 90 % interval -25 to -17 %) at" in size_sentence(law, {}, (-21.0, -25.0, -17.0))
+    assert "Friction is lower (−21 %, 90 % interval −25 to −17 %) at" in size_sentence(law, {}, (-21.0, -25.0, -17.0))
 
 
 def test_a_law_of_the_pressure_alone_acts_on_several_patterns_or_on_none() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -20,12 +21,22 @@ from tribo.diagnostics import (
 from tribo.diagnostics.candidates import CauseCandidate, weigh
 from tribo.diagnostics.model import PATTERN, Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
-from tribo.diagnostics.planning import Finding, Plan, first_test_of, next_test, settling_test
+from tribo.diagnostics.planning import (
+    PAPER_LAW,
+    TYPICAL,
+    Finding,
+    Plan,
+    expected_fit,
+    first_test_of,
+    narrowing_pulls,
+    next_test,
+    settling_test,
+)
 from tribo.diagnostics.scatter import first_noise
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.errors import FitError
 from tribo.mechanisms import MECHANISMS
-from tribo.records import Ingested
+from tribo.records import Ingested, Test
 from tribo.wording.part_sentences import next_test_sentence
 from tribo.wording.verdict_sentences import worded
 
@@ -228,8 +239,30 @@ def test_a_load_error_without_a_rival_is_measured_and_suction_is_removed() -> No
 
 
 def test_two_columns_that_act_together_are_varied_each_with_each() -> None:
-    words = next_test_sentence(first_test_of("humidity_pct", "hold_s"))
-    assert words == (
-        "Set the humidity and the hold time to their lowest and highest value, each with each, in random order, "
-        "on one sample at one load: 18 pulls."
+    f = expected_fit(hidden(design=LADDER).campaign, TYPICAL, PAPER_LAW, None)
+    test = first_test_of(f, "speed_m_s", "hold_s", sample="B")
+    assert next_test_sentence(test) == (
+        "Set the pull speed and the hold time to their lowest and highest value, each with each, in random order, "
+        f"on B at one load: {test.design['pulls']} pulls."
     )
+
+
+def test_the_pulls_that_are_proposed_leave_four_fifths_of_the_width_of_an_interval() -> None:
+    """Counted again from the fit of all tests, the further pulls among them."""
+    campaign = hidden(design=replace(LADDER, repeats=2, specimens=2, masses_g=(25.0, 90.0))).campaign
+
+    def information(tests: Sequence[Test]) -> float:
+        f = expected_fit(replace(campaign, tests=tuple(tests)), TYPICAL, PAPER_LAW, None)
+        speed = f.setup.observations.conditions.speed_m_s
+        course = (speed - 0.425e-3) / 0.375e-3
+        return float(np.sum(f.cleared(np.repeat(course[:, None], 2, axis=1)[:, :, None])[0] ** 2))
+
+    tests = list(campaign.tests)
+    pulls = narrowing_pulls(expected_fit(campaign, TYPICAL, PAPER_LAW, None), ["speed_m_s"], "B")
+    assert pulls < 72
+    of_b = [t for t in tests if t.sample == "B"]
+    further = [
+        replace(of_b[k % len(of_b)], test_id=f"further {k}", speed_m_s=(0.05e-3, 0.425e-3, 0.8e-3)[k % 3])
+        for k in range(pulls)
+    ]
+    assert 0.75 < np.sqrt(information(tests) / information([*tests, *further])) < 0.82

@@ -38,7 +38,7 @@ def test_a_measurement_of_half_the_model_deviates_by_minus_fifty_percent() -> No
     assert ratio(0.5, 0.4, 0.6).deviation == pytest.approx(-0.5)
     agreement = Agreement("C", "static", (ratio(0.5, 0.4, 0.6, 1), ratio(0.4, 0.3, 0.5, 2)), False)
     assert agreement.verdict == "model too high"
-    assert agreement.mean_deviation == pytest.approx((0.5 + 0.4) / 2 - 1)
+    assert agreement.mean_deviation == pytest.approx((0.5 * 0.4) ** 0.5 - 1)
     assert agreement.worst.normal_load_N == 2
 
 

@@ -128,8 +128,8 @@ class Agreement:
 
     @property
     def mean_deviation(self) -> float:
-        """Mean over the loads of measured / simulated - 1."""
-        return float(np.mean([load.deviation for load in self.loads]))
+        """Geometric mean over the loads of measured / simulated, less 1: the mean that the diagnosis tells."""
+        return float(np.exp(np.mean(np.log([load.ratio for load in self.loads]))) - 1.0)
 
     @property
     def verdict(self) -> Verdict | Literal["mixed"]:

@@ -193,7 +193,8 @@ def draw_records(numbers: pd.DataFrame) -> Figure:
         for number, (_, record) in enumerate(sample.groupby("test_id", sort=False)):
             ax.plot(record["value"], record["T_over_N"], lw=0.7, color=style.sample_mark(number)[0])
         first = sample.iloc[0]
-        style.panel_title(ax, first["sample"], f"{sample['test_id'].nunique()} records")
+        n = sample["test_id"].nunique()
+        style.panel_title(ax, first["sample"], f"{n} record{'s' * (n > 1)}")
         ax.set_xlabel(sentence_case(str(first["way"])))
         if style.is_leftmost(ax):
             ax.set_ylabel("T / N")
@@ -249,7 +250,7 @@ def _spread(ax: Axes, values: pd.Series) -> None:
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, values)
     else:
-        ax.xaxis.set_major_locator(MaxNLocator(5))
+        ax.xaxis.set_major_locator(MaxNLocator(5, integer=bool((values % 1 == 0).all())))
 
 
 def _regimes(numbers: pd.DataFrame) -> list[Line2D]:

@@ -137,8 +137,8 @@ def misfit_numbers(d: Diagnosis) -> pd.DataFrame:
     calibration absorbs both.
     ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
     and the specimens are taken out; ``p_adjusted`` sets it against the strongest contrast of simulated campaigns. The
-    p of a mean is that of the verdict: where the patterned samples differ from the model by more than its stated error,
-    that of the difference itself; of both regimes together the larger of the two.
+    size and the p of a mean are those of the verdict where the patterned samples differ from the model by more than its
+    stated error; of both regimes together the geometric mean and the larger p.
     The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
     stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
     """
@@ -167,13 +167,15 @@ def _cells(d: Diagnosis, columns: list[Covariate], observable: str, residual: Fl
             cells.append((row, column, _end_to_end(column, residual[here], here)))
             shapes.append(shape)
     strength = _strengths(f, np.column_stack(shapes), observable)
-    of_patterns = {(c.name, r): c.p_adjusted for c in pattern_differences(d) for r in c.regimes}
+    of_patterns = {(c.name, r): (c.p_adjusted, c.effect_percent) for c in pattern_differences(d) for r in c.regimes}
     found = []
     for (row, column, effect), z in zip(cells, strength, strict=True):
         p = d.screened.p_adjusted(abs(float(z)))
         if column.name == "mean" and observable != "drop":
             about = [r for r in ("static", "sliding") if observable in (r, "both")]
-            p = max((of_patterns[row, r] for r in about if (row, r) in of_patterns), default=p)
+            if told := [of_patterns[row, r] for r in about if (row, r) in of_patterns]:
+                p = max(chance for chance, _ in told)
+                effect = float(percent(np.mean([np.log1p(size / 100.0) for _, size in told])))
         found.append(_cell(observable, row, column, effect, float(z), p))
     return found
 

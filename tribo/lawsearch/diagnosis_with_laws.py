@@ -90,7 +90,8 @@ def with_laws(
     if ties and not verdict.equivalent:
         next_test = separating_test(*ties[0], model.setup.observations.conditions)
     elif law is not None and not any(layer.kind == "cause" for layer in layers):
-        next_test = first_test_of(with_known, *law.columns, sample=law.sample)
+        acted_on = _acted_on(law, model.setup.observations.conditions)
+        next_test = first_test_of(with_known, *law.columns, sample=acted_on)
     shows = replace(verdict.shows, within_chance=bool(left.p.min() >= level))
     return replace(d, laws=found, verdict=replace(verdict, layers=layers, next_test=next_test, shows=shows))
 
@@ -267,6 +268,12 @@ def _difference(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> tuple[Diff
         return "corners", {"vary": list(law.columns)}
     name = law.columns[0]
     return "place", {name: _apart(law, other, column_values(c, name))}
+
+
+def _acted_on(law: WrittenLaw, c: Conditions) -> str:
+    """The sample on which a law acts most; none where it acts on all alike."""
+    weight = law.weight(c)
+    return str(c.sample[int(np.argmax(weight))]) if np.ptp(weight) > 0 else ""
 
 
 def _told_by(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> str:

@@ -129,7 +129,7 @@ def _summary(study: Study) -> dict[str, Any]:
 
 def _table2(study: Study) -> dict[str, Any]:
     simulated = study.comparison.simulated if study.comparison is not None else ()
-    load = findings.common_loads(study)[1]
+    lowest, load, highest = findings.common_loads(study)
     regimes = []
     for regime in REGIMES:
         rows: list[tuple[Any, ...]] = []
@@ -141,7 +141,8 @@ def _table2(study: Study) -> dict[str, Any]:
                 rows.append((sample, area_fraction, fit_cells(fit, load), model, fit))
         if rows:
             regimes.append((regime, rows))
-    return {"load_N": load, "regimes": regimes, "simulated": bool(simulated)}
+    of_loads = "the middle" if lowest < load < highest else "one"
+    return {"load_N": load, "of_loads": of_loads, "regimes": regimes, "simulated": bool(simulated)}
 
 
 def _agreement_tables(study: Study) -> list[dict[str, Any]]:

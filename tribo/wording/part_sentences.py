@@ -68,7 +68,7 @@ def meaning_in_words(name: str, shows: object = None) -> str:
     if isinstance(shows, tuple) and shows and isinstance(shows[0], RunningIn):
         return "within one record, friction changes with the distance before it is steady"
     _, _, column = name.partition(":")
-    return f"friction follows the recorded column {in_words(column)}" if column else mechanism(name).meaning
+    return f"friction follows {in_words(column)}, which no other mechanism uses" if column else mechanism(name).meaning
 
 
 def with_choice(name: str, choice: str) -> str:
@@ -356,6 +356,7 @@ def why_not(e: Excluded) -> str:
 def next_test_sentence(t: NextTest) -> str:
     """What to do next, without the reason."""
     design, pulls = t.design, t.design.get("pulls")
+    one_sample = design.get("sample", "one sample")
     if t.kind == "measure":
         measurement = mechanism(str(design["measure"])).measurement
         return measurement.text if measurement is not None else ""
@@ -370,12 +371,12 @@ def next_test_sentence(t: NextTest) -> str:
         return f"Pull {design['sample']} {pulls} times in random order with {where}, which were not measured."
     if t.kind == "vary one column":
         column = str(design["covariate"])
-        alone = f"Vary {in_words(column)} alone, in random order, on one sample at one load"
+        alone = f"Vary {in_words(column)} alone, in random order, on {one_sample} at one load"
         return f"{ALONE.get(column, alone)}: {pulls} pulls."
     if t.kind == "factorial":
         both = joined([in_words(name) for name in design["vary"]])
         each = f"Set {both} to their lowest and highest value, each with each, in random order"
-        return f"{each}, on one sample at one load: {pulls} pulls."
+        return f"{each}, on {one_sample} at one load: {pulls} pulls."
     if t.kind == "vary what was fixed":
         varied = [v.text for name in t.separates if (v := mechanism(name).variation) is not None]
         if "sample" not in design:

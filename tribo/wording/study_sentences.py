@@ -402,7 +402,7 @@ def _dependence(study: Study) -> Iterator[str]:
     if clear.empty:
         yield "T/N varies significantly with no recorded variable (rank correlations, adjusted for their number)."
     for row in _rows(clear.head(MOST_SAID)):
-        change = f"{percent(row['change_percent'] / 100)} from {significant(row['low'])} to {significant(row['high'])}"
+        change = f"{percent(row['change_percent'] / 100)} from {row['low']:.3g} to {row['high']:.3g}"
         yield (
             f"{row['regime'].capitalize()} T/N of {row['sample']} varies with {row['label']}: {change} (rank "
             f"correlation {significant(row['rank'], 2)}, adjusted p {p_text(row['p_adjusted'])}, "

@@ -481,7 +481,11 @@ def why_next(v: Verdict) -> str:
 
 
 def verdict_in_words(v: Verdict) -> dict[str, Any]:
-    """The parts of a worded verdict as text for the report; empty where the verdict has none."""
+    """The parts of a worded verdict as text for the report; empty where the verdict has none.
+
+    Samples that differ from the model are in the table of all samples, once.
+    """
+    listed = bool(of_kind(v, "pattern_correction"))
     headings = HEADINGS_WITHOUT_MODEL if without_model(v) else HEADINGS
     return {
         "headings": headings | ({"none": NOTHING_TESTED} if v.verdict == "cannot_tell" else {}),
@@ -495,7 +499,8 @@ def verdict_in_words(v: Verdict) -> dict[str, Any]:
         "causes": [_cause(cause) for cause in v.causes],
         "gain": _gain(v.gain),
         "next_test": v.next_test.text if v.next_test is not None else "",
-        "misfits": [_misfit(misfit) for misfit in v.misfits],
+        "misfits": [_misfit(misfit) for misfit in v.misfits if not (listed and misfit.covariate == "sample")],
+        "no_misfit": not v.misfits,
         "excluded": [_excluded(e, e.reason) for e in v.excluded],
         "not_testable": [_excluded(e, why_not(e)) for e in v.not_testable],
         "corrections": [_correction(x) for x in of_kind(v, "pattern_correction")],
