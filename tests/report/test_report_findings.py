@@ -75,7 +75,7 @@ def test_the_sentence_counts_loads_and_names_the_worst() -> None:
     sentence = wording.agreement_sentence(Agreement("B", "sliding", loads, False))
     assert "agrees within the 95 % interval at 1 of 3 loads" in sentence
     assert "too high at 2 of 3 loads" in sentence
-    assert "by −23 %; the largest difference is −50 %, at 3.00 N" in sentence
+    assert "by −26 %; the largest difference is −50 %, at 3.00 N" in sentence
 
 
 def test_the_calibrated_sample_is_no_evidence(study: Study) -> None:
