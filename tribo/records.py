@@ -401,6 +401,7 @@ class Pull:
 
 
 STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
+MEDIAN_TO_SD = 1.4826  # standard over median absolute deviation of a normal distribution
 CLOSED_TRACK_M = 10.0  # a longer slide runs over its own track again and again; no sled has so long a track
 
 

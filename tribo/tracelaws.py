@@ -17,7 +17,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares, minimize
 from scipy.stats import t as student
 
-from tribo.records import FloatArray, Ingested, Phase, Slip, Test, Trace, TraceLaw, TraceLawParameter
+from tribo.records import MEDIAN_TO_SD, FloatArray, Ingested, Phase, Slip, Test, Trace, TraceLaw, TraceLawParameter
 from tribo.slider.motion import Drive, speed_steps
 from tribo.slider.rate_and_state import WEIGHTS, integrated
 from tribo.traces.events import slips_of
@@ -28,7 +28,6 @@ FEWEST_SLIPS = 8
 _FEWEST_IN_SLIP = 8  # samples between peak and trough from which on the slip itself is fitted
 _LOADING = (0.3, 0.95)  # share of the time of a loading between which its slope is taken
 _OUTLIER = 5.0  # median deviations from the median beyond which a slip does not count
-_MAD = 1.4826
 _CLEAR = 2.0  # standard errors by which a law must predict slips left out better
 
 
@@ -206,7 +205,7 @@ def slip_force(
 def _mean(name: str, values: FloatArray, unit: str) -> TraceLawParameter:
     """Mean over slips with its 95 % interval, for normal values correlated from one to the next."""
     middle = float(np.median(values))
-    width = _MAD * float(np.median(np.abs(values - middle)))
+    width = MEDIAN_TO_SD * float(np.median(np.abs(values - middle)))
     kept = values[np.abs(values - middle) <= _OUTLIER * width] if width > 0 else values
     n, centred = kept.size, kept - kept.mean()
     power = float(centred @ centred)

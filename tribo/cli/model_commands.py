@@ -122,22 +122,11 @@ def _rows(
 
 def _described(given: Mapping[str, Any], seed: int) -> tuple[SliderConfig, dict[str, Any]]:
     """The run that the options describe, and the parameters set by name; SimulationError with all that is wrong."""
-    from tribo.errors import SimulationError
     from tribo.slider import SliderConfig, read_slider_law
-    from tribo.springblock.design_file import setting
+    from tribo.springblock.design_file import setting, together
 
-    problems: list[Problem] = []
     base = SliderConfig(seed=seed)
-    parts: tuple[Callable[[], Any], ...] = (partial(_drive, given), lambda: _law(given, read_slider_law))
-    found: list[Any] = []
-    for part in parts:
-        try:
-            found.append(part())
-        except SimulationError as refused:
-            problems += refused.problems
-    if problems:
-        raise SimulationError(problems)
-    drive, (law, values) = found
+    drive, (law, values) = together(partial(_drive, given), lambda: _law(given, read_slider_law))
     changes: dict[str, Any] = {
         name: given[name] for name in _SLIDER_NUMBERS if name != "speed_mm_s" and given.get(name) is not None
     }

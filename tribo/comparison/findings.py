@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from tribo.fitting.linear import levels_of
-from tribo.records import REGIMES, ComparisonRow, FloatArray, LawFit, Pattern, Regime, SetAside, Study
+from tribo.records import MEDIAN_TO_SD, REGIMES, ComparisonRow, FloatArray, LawFit, Pattern, Regime, SetAside, Study
 
 COLUMNS = ["sample_number", "sample", "regime", "normal_load_N", "ratio", "ratio_low", "ratio_high"]
 LEVEL = 0.95
@@ -282,9 +282,6 @@ def parameter_correlations(fits: Iterable[LawFit]) -> list[float]:
     return found
 
 
-LOAD_TOLERANCE = 0.02  # loads closer than this (relative) are repeats of one load
-
-
 def flat_sample(study: Study) -> str:
     """The flat sample of the campaign; empty where none was measured or chosen."""
     return study.ingested.campaign.flat_sample
@@ -312,9 +309,9 @@ def fit_of(fits: Iterable[LawFit], sample: str, regime: str) -> LawFit | None:
     return next((f for f in fits if f.sample == sample and f.regime == regime), None)
 
 
-def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:
-    """The mean load of the level each load belongs to: loads within ``tolerance`` are one level."""
-    return levels_of(np.asarray(normal_load_N, float), tolerance)
+def load_levels(normal_load_N: FloatArray) -> FloatArray:
+    """The mean load of the level each load belongs to."""
+    return levels_of(np.asarray(normal_load_N, float))
 
 
 def shown(study: Study) -> bool:
@@ -329,7 +326,6 @@ def all_set_aside(study: Study) -> dict[str, SetAside]:
 
 
 ODD_SCORE = 3.5  # modified z-score of Iglewicz and Hoaglin (1993)
-MAD_TO_SD = 1.4826  # of a normal distribution
 FEWEST_SIBLINGS = 2
 
 
@@ -362,7 +358,7 @@ def _judged_in(table: pd.DataFrame, regime: Regime) -> dict[str, dict[str, Any]]
     siblings = cells.transform("size") - 1
     deviation = cells.transform(_from_the_others)
     judged = siblings >= FEWEST_SIBLINGS
-    scale = MAD_TO_SD * float(deviation[judged].abs().median())
+    scale = MEDIAN_TO_SD * float(deviation[judged].abs().median())
     if not scale > 0:
         return {}
     rows = zip(table["test_id"][judged], deviation[judged], siblings[judged], strict=True)

@@ -18,7 +18,7 @@ from tribo.diagnostics.verdict import Estimate, Layer
 from tribo.display import displayed
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import STROKES_APART, Quantity, TraceEvidence
-from tribo.records import CLOSED_TRACK_M, FloatArray, Ingested, Pull, Test, Trace
+from tribo.records import CLOSED_TRACK_M, MEDIAN_TO_SD, FloatArray, Ingested, Pull, Test, Trace
 
 CERTAIN = 5.0  # standard errors
 NOISE_SHARE = 0.5  # an offset below half the noise of one reading does not matter to any result
@@ -135,7 +135,7 @@ def rise_stiffening(o: Observations) -> Evidence | None:
     x, y = speed[good] - speed[good].mean(), np.log(o.rise_N_per_m[good])
     slope = float(x @ (y - np.median(y)) / (x @ x))
     left = y - np.median(y) - slope * x
-    error = float(1.4826 * np.median(np.abs(left)) / np.sqrt(x @ x))
+    error = float(MEDIAN_TO_SD * np.median(np.abs(left)) / np.sqrt(x @ x))
     certain = abs(slope) > CERTAIN * error and abs(slope) > RISE_PER_FOLD
     return Evidence(slope, error, bool(certain), "", slope * float(np.ptp(x)))
 
@@ -143,7 +143,7 @@ def rise_stiffening(o: Observations) -> Evidence | None:
 def _centre(values: FloatArray) -> tuple[float, float]:
     """Median and its standard error."""
     centre = float(np.median(values))
-    spread = 1.4826 * float(np.median(np.abs(values - centre)))
+    spread = MEDIAN_TO_SD * float(np.median(np.abs(values - centre)))
     return centre, max(1.2533 * spread / np.sqrt(len(values)), 1e-15)
 
 

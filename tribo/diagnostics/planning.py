@@ -342,15 +342,11 @@ def _over_range(c: Conditions, name: str) -> FloatArray:
     cells = c.columns[name] if name in c.columns else getattr(c, name, np.zeros(0))
     if len(cells) != len(c.sample):
         return np.zeros(len(c.sample))
-    x = _numbers(cells)
+    x = np.asarray(pd.to_numeric(pd.Series(cells), errors="coerce"), float)
     if not np.isfinite(x).any():
         return np.where(cells == np.unique(cells)[0], 1.0, -1.0)
     low, high = np.nanmin(x), np.nanmax(x)
     return np.asarray(np.nan_to_num((2.0 * x - low - high) / max(high - low, 1e-300)))
-
-
-def _numbers(cells: np.ndarray) -> FloatArray:
-    return np.asarray(pd.to_numeric(pd.Series(cells), errors="coerce"), float)
 
 
 def more_tests(lack: TooLittle) -> NextTest:

@@ -38,7 +38,7 @@ from tribo.fitting.linear import (
 )
 from tribo.fitting.samples import fit_samples
 from tribo.laws import design_over_load
-from tribo.records import REGIMES, FloatArray, Ingested, LawFit, Regime
+from tribo.records import MEDIAN_TO_SD, REGIMES, FloatArray, Ingested, LawFit, Regime
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -216,7 +216,6 @@ def _fewest(counts: range, wanted: float, smallest: Callable[[int], float]) -> i
 
 
 FALSE_ALARMS = 0.05  # chance of flagging anything at all in a campaign without outliers, for Gaussian scatter
-_MEDIAN_TO_SD = 1.4826
 
 
 def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:
@@ -314,7 +313,7 @@ def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float |
     if not lines:
         return pd.DataFrame(columns=OUTLYING)
     bulk = np.concatenate([residual / np.sqrt(1 - leverage) for _, _, residual, leverage in lines])
-    scale = _MEDIAN_TO_SD * float(np.median(np.abs(bulk)))
+    scale = MEDIAN_TO_SD * float(np.median(np.abs(bulk)))
     if scale == 0:
         return pd.DataFrame(columns=OUTLYING)
     limit = _limit(len(bulk), float(sum((1 - leverage).sum() for *_, leverage in lines)))
@@ -402,7 +401,7 @@ def _apart(
     leverage = 1 / np.bincount(index)[index]
     fit = RLM(log_force, design, M=HuberT()).fit()
     residual = np.asarray(fit.resid)
-    scale = _MEDIAN_TO_SD * float(np.median(np.abs(residual) / np.sqrt(1 - leverage)))
+    scale = MEDIAN_TO_SD * float(np.median(np.abs(residual) / np.sqrt(1 - leverage)))
     if scale == 0:
         return []
     score = np.abs(residual) / (scale * np.sqrt(1 - leverage))

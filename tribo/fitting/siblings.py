@@ -22,8 +22,6 @@ SPREADS = 400  # simulated campaigns of the same design
 LEAST_RATIO = 1.15  # less is not a slip, whatever the scatter
 SPLIT = 5.0  # ratio between equal pulls that no scatter of repeats or specimens gives, and a wrong unit exceeds
 FEWEST_SPLIT, LEAST_SPLIT = 3, 0.25  # cells, and the share of all, that a slip of many exports splits
-MAD_TO_SD = 1.4826
-LOAD_TOLERANCE = 0.02
 LOADS_APART = 0.1  # by which two loads differ, as ln, at the least: the line of loads that are alike leads anywhere
 MOST_NAMED = 3
 FEWEST_COPIED, COPIED_SHARE, COPIED_DIGITS = 3, 0.25, 3  # pairs of forces with so many digits, equal by chance hardly
@@ -108,7 +106,7 @@ def _pulls_of(table: pd.DataFrame, regime: str) -> Pulls:
     rows = table[(table[f"{regime}_N"] > 0) & (table["normal_load_N"] > 0)]
     load = rows["normal_load_N"].to_numpy(float)
     sample, specimen = rows["sample"].to_numpy(str), rows["specimen"].to_numpy(str)
-    level = pd.factorize(levels_of(load, LOAD_TOLERANCE))[0]
+    level = pd.factorize(levels_of(load))[0]
     cell, body = (pd.factorize(pd.MultiIndex.from_arrays([sample, kind]))[0] for kind in (level, specimen))
     return {
         "test_id": rows["test_id"].to_numpy(str), "sample": sample, "specimen": specimen, "load_N": load,

@@ -213,8 +213,7 @@ def choose_free(
     c = model.setup.observations.conditions
     (alone, (column, *_), _), (apart, columns, scope) = likeliest(search, model.residual, 1, 2)
     if apart > alone:
-        first = _surface(replace(scope, shapes=_knots(columns, c)), model)
-        surface = _settled_surface(model, Background(model, _with_heights(first)), without)
+        surface = _settled_surface(model, _surface(scope, columns, model), without)
         if surface is not None:
             return _by_curve(model, surface, p, rng)
     grammar = Grammar(model, without, [each for each in shapes_of(c) if {s.column for s in each[0]} == {column}])
@@ -222,13 +221,11 @@ def choose_free(
     return choose_form(model, grammar, grammar.law(int(np.argmax(net))), p, rng)
 
 
-def _knots(columns: Sequence[str], c: Conditions) -> tuple[Shape, ...]:
-    return tuple(shape for name in columns if (shape := knots_of(name, c)) is not None)
-
-
-def _surface(law: WrittenLaw, without: ModelFit) -> FreeCurve:
-    """The surface of a law without heights that a fit without it tells of."""
-    effects = effects_of([law], without.setup.observations.conditions, terms_of(without))[0]
+def _surface(scope: WrittenLaw, columns: Sequence[str], without: ModelFit) -> FreeCurve:
+    """The surface of these columns in one scope that a fit without it tells of."""
+    c = without.setup.observations.conditions
+    law = replace(scope, shapes=tuple(shape for name in columns if (shape := knots_of(name, c)) is not None))
+    effects = effects_of([law], c, terms_of(without))[0]
     return fitted_curve(without, (law, effects), informed_share(without.noise))
 
 
@@ -255,16 +252,16 @@ def _likelier_surface(
     (alone, _, _), (apart, columns, scope) = likeliest(search, at.residual, 1, 2)
     if len(law.columns) == 1 and apart < alone + CLOSE:
         return None
-    first = _surface(replace(scope, shapes=_knots(columns, at.conditions)), left)
-    surface = _settled_surface(model, Background(model, _with_heights(first)), without)
+    surface = _settled_surface(model, _surface(scope, columns, left), without)
     return surface if surface is not None and better_left_out(model, at.after, surface) else None
 
 
-def _settled_surface(model: ModelFit, at: Background, without: Collection[str]) -> FreeCurve | None:
-    """The surface that is likeliest at the noise that it leaves itself; None where a curve of one column is as likely
-    there."""
-    sets = free_columns(at.conditions, without)
+def _settled_surface(model: ModelFit, surface: FreeCurve, without: Collection[str]) -> FreeCurve | None:
+    """From a first surface on, the one that is likeliest at the noise that it leaves itself; None where a curve of one
+    column is as likely there."""
+    sets = free_columns(model.setup.observations.conditions, without)
     for _ in range(ROUNDS):
+        at = Background(model, _with_heights(surface))
         left = replace(at.without, residual=at.residual)
         _, columns, _ = likeliest(FreeSearch(left, *free_scopes(at.conditions, few=True), sets), at.residual, 2)[0]
         own = [each for each in sets if set(each) <= set(columns)]
@@ -272,10 +269,9 @@ def _settled_surface(model: ModelFit, at: Background, without: Collection[str]) 
         (alone, _, _), (apart, columns, scope) = likeliest(search, at.residual, 1, 2)
         if apart < alone + CLOSE:
             return None
-        surface = _surface(replace(scope, shapes=_knots(columns, at.conditions)), left)
+        surface = _surface(scope, columns, left)
         if (columns, scope) == (at.law.columns, replace(at.law, shapes=())):
             break
-        at = Background(model, _with_heights(surface))
     return surface
 
 

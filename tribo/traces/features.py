@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tribo.records import Feature, FloatArray, Pull, Slip, Trace
+from tribo.records import MEDIAN_TO_SD, Feature, FloatArray, Pull, Slip, Trace
 from tribo.traces.drive import speed_level_m_s
 from tribo.traces.evaluation import with_static_peak
 from tribo.traces.signal import (
@@ -193,7 +193,7 @@ def _of_rise(time: FloatArray, force: FloatArray, pull: Pull, speed: float, tau:
     away = np.abs(smooth - running_mean(smooth, max(smooth.size // 12, 3)))[
         smooth.size // 2 :
     ]  # near the peak, where it is
-    noise = 1.4826 * float(np.median(away))
+    noise = MEDIAN_TO_SD * float(np.median(away))
     least = max(_DROP * pull.static_N, _OVER_NOISE * noise)
     falls = turning_points(np.append(smooth, smooth[-1] - 2.0 * least), least)[0]  # the peak itself is the last one
     found["precursor_drops"] = Feature(float(falls.size - 1), 0.0, math.nan, math.nan, rise.size)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from tribo.records import CLOSED_TRACK_M, FloatArray, Interval, Phase, Pull, Reading, Test, Trace
-from tribo.traces.signal import condense, line, mean_of_level, median_of_three, of_student, variance_of_slow
+from tribo.traces.signal import NORMAL_95, condense, line, mean_of_level, median_of_three, of_student, variance_of_slow
 from tribo.traces.sliding import transient_end
 
 _COSINES_OF_ALL = 20  # coefficients that tell the noise of a whole slide
@@ -123,7 +123,7 @@ def _about(value: float, *halves: float) -> Interval:
 def _of_zero(part: Part) -> float:
     """Half width of the 95 % interval of a zero."""
     u = part.pull.zero_u_N
-    return 1.96 * u if math.isfinite(u) else 0.0
+    return NORMAL_95 * u if math.isfinite(u) else 0.0
 
 
 def _levels(part: Part) -> Iterator[_Level]:
@@ -161,7 +161,7 @@ def _plateau(level: _Level, way: str, viscosity_Pa_s: float) -> Reading:
     load, speed = level.load_N, level.speed_m_s
     if load > 0:
         u = level.part.pull.recorded_load_u_N
-        of_load = 1.96 * u / load if math.isfinite(u) and not level.part.test.load_from else 0.0
+        of_load = NORMAL_95 * u / load if math.isfinite(u) and not level.part.test.load_from else 0.0
         ratio = force[0] / load
         values["coefficient"] = _about(ratio, _half(force) / load, ratio * of_load)
         hersey = viscosity_Pa_s * speed / load
@@ -435,7 +435,7 @@ def _holds(part: Part) -> list[Reading]:
     pull = part.pull
     found, gained = [], []
     for restart in pull.restarts:
-        force = _about(restart.static_N, 1.96 * restart.static_u_N)
+        force = _about(restart.static_N, NORMAL_95 * restart.static_u_N)
         load = part.test.normal_load_N
         values: dict[str, Interval] = {"force_N": force}
         if load > 0:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.errors import Problem, TraceError
-from tribo.records import FloatArray, Trace
+from tribo.records import MEDIAN_TO_SD, FloatArray, Trace
 
 BLOCKS = 16  # blocks a window is cut into; enough for a variogram, few enough to be longer than the correlation
 _SLOPE_U = 0.35  # standard uncertainty of a variogram's slope over BLOCKS blocks, as a share of level over mean lag
@@ -24,8 +24,7 @@ _STANDS_OUT = 2.3  # by this many times the variance of all
 _COSINES = 8  # coefficients after it that tell the noise of its mean
 _FEWEST_OF_LEVEL = 12  # samples from which on a mean has an interval
 _MEANS_OF_LEVEL = 600  # of a long level: thirty for each half wave of the fastest coefficient
-_NORMAL_95 = 1.96
-_MEDIAN_TO_SD = 1.4826  # of a normal distribution
+NORMAL_95 = 1.96
 MINIMUM_SAMPLES = 20
 SPIKE_OVER_NOISE = 8.0
 SPIKE_OVER_NEIGHBOURS = 3.0
@@ -56,7 +55,7 @@ def sample_noise(values: FloatArray) -> float:
     if values.size < 3:
         return math.nan
     second = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
-    typical = _MEDIAN_TO_SD * float(np.median(second))
+    typical = MEDIAN_TO_SD * float(np.median(second))
     if typical <= 0.0:
         typical = math.sqrt(float(second @ second) / second.size)
     return typical / math.sqrt(6.0)
@@ -254,7 +253,7 @@ def steady(time_s: FloatArray, force: FloatArray) -> tuple[float, float, float, 
     The uncertainty is that whose 1.96-fold is the half width of the 95 % interval of :func:`mean_of_level`.
     """
     mean, low, high = mean_of_level(force)
-    mean_u = (high - low) / 2.0 / _NORMAL_95
+    mean_u = (high - low) / 2.0 / NORMAL_95
     if not math.isfinite(mean_u):
         mean_u = float(force.std(ddof=1)) / math.sqrt(force.size) if force.size > 1 else math.nan
     return mean, mean_u, line(time_s, force)[0], sample_noise(force)
@@ -566,7 +565,7 @@ def _block_noise(force: FloatArray) -> FloatArray:
     found = []
     for part in (force[:at].reshape(larger, size + 1), force[at:].reshape(blocks - larger, size)):
         second = np.abs(part[:, 2:] - 2.0 * part[:, 1:-1] + part[:, :-2])
-        typical = _MEDIAN_TO_SD * np.median(second, axis=1)
+        typical = MEDIAN_TO_SD * np.median(second, axis=1)
         found.append(np.where(typical > 0.0, typical, np.sqrt((second**2).mean(axis=1))) / math.sqrt(6.0))
     return np.concatenate(found)
 

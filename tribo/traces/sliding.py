@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tribo.records import CLOSED_TRACK_M, FloatArray, Oscillation
+from tribo.records import CLOSED_TRACK_M, MEDIAN_TO_SD, FloatArray, Oscillation
 from tribo.traces.peak import Motion
 from tribo.traces.signal import condense, line, noise_of, sample_noise, steady, turning_points, wander
 
@@ -31,7 +31,6 @@ MOST_REGAINED = 2.0  # times k v by which a force rises at the most: a slider sw
 _POSSIBLE = 0.9  # share of the cycles that the drive must be able to supply
 _MOST_TRIES, _NEXT_TRY = 12, 1.5  # falls that count are made larger by this factor until it can
 _MEDIAN_U = 1.2533  # standard uncertainty of a median over that of a mean, normal distribution
-_MAD = 1.4826
 _REPEATS = 0.4  # largest spread of the cycle times over their mean of an oscillation that repeats
 _OF_TIME = 0.5  # share of the time that a slider which sticks is stuck
 _FREE = 1.3  # a period up to this many free periods is that of an inertial oscillation
@@ -58,7 +57,7 @@ def oscillation_of(
     calm, time, force, peaks, _ = cycles_of(time_s, force_N, smallest_drop_N, drive_N_per_s)
     supplied = _supplied(time, force, peaks, drive_N_per_s, sample_noise(calm))
     if peaks.size <= _FEWEST_OF_REGIME:
-        spread = _MAD * float(np.median(np.abs(force_N - np.median(force_N))))
+        spread = MEDIAN_TO_SD * float(np.median(np.abs(force_N - np.median(force_N))))
         keeps_level = spread < max(5.0 * sample_noise(force_N), 0.1 * abs(float(np.median(force_N))))
         return Oscillation("steady" if keeps_level else "irregular", int(supplied.sum()))
     troughs = _troughs(force, peaks)
@@ -184,7 +183,7 @@ def _loading(
 def _median(values: FloatArray) -> tuple[float, float]:
     """The median and its standard uncertainty."""
     middle = float(np.median(values))
-    spread = _MAD * float(np.median(np.abs(values - middle)))
+    spread = MEDIAN_TO_SD * float(np.median(np.abs(values - middle)))
     return middle, _MEDIAN_U * spread / math.sqrt(values.size)
 
 

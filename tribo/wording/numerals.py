@@ -85,7 +85,7 @@ def interval(low: float, high: float) -> str:
 
 def general(value: float) -> str:
     """ "−6.13", "25": up to four digits, with a true minus sign."""
-    return f"{value:.4g}".replace("-", "−")
+    return _signed(f"{value:.4g}")
 
 
 def _signed(text: str) -> str:

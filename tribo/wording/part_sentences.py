@@ -19,7 +19,7 @@ from tribo.mechanisms import MECHANISMS, mechanism
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.vocabulary import COLUMNS, OBSERVABLES, ColumnWords, in_words
 from tribo.wording.law_sentences import each_value, law_sentence, law_test, size_sentence, tied_laws
-from tribo.wording.numerals import counted, joined, p_text, sentence_case, signed, with_uncertainty
+from tribo.wording.numerals import counted, interval, joined, p_text, sentence_case, signed, with_uncertainty
 
 BETWEEN = {
     "mean": "mean", "bend": "the ends above the middle", "ends": "from the low to the high end",
@@ -165,7 +165,7 @@ def cause_sentence(c: Cause) -> str:
     if c.changes is None:
         return f"{name}. {signs_of(m)}"
     low, high = c.changes
-    said = f"{name}: {size}. It changes the calibrated model by {signed(low)} to {signed(high)} %. {signs_of(m)}"
+    said = f"{name}: {size}. It changes the calibrated model by {interval(low, high)}. {signs_of(m)}"
     return f"{said} {m.choosing.remedy(c.choice)}".rstrip() if c.choice else said
 
 
@@ -175,7 +175,7 @@ def layer_sentence(layer: Layer) -> str:
     if layer.kind == "pattern_correction":
         return (
             f"{sentence_case(layer.regimes[0])} friction of {layer.name} differs from the model by {signed(value)} % "
-            f"(geometric mean over its tests; 90 % interval {signed(low)} to {signed(high)} %; adjusted p "
+            f"(geometric mean over its tests; 90 % interval {interval(low, high)}; adjusted p "
             f"{p_text(layer.p_adjusted)})."
         )
     if layer.kind == "baseline":
@@ -202,8 +202,8 @@ def layer_sentence(layer: Layer) -> str:
         said = f"{sentence_case(mechanism(layer.name).in_words)} changes T by {change_over_range(layer.over)}."
         return f"{said} {tied_laws(shows)}" if tied else said
     said = (
-        f"{sentence_case(mechanism(layer.name).in_words)} changes T by {signed(value)} % (90 % interval {signed(low)} "
-        f"to {signed(high)} %) where it acts most: {place(layer)}."
+        f"{sentence_case(mechanism(layer.name).in_words)} changes T by {signed(value)} % "
+        f"(90 % interval {interval(low, high)}) where it acts most: {place(layer)}."
     )
     return f"{said} {tied_laws(shows)}" if tied else said
 
