@@ -16,7 +16,7 @@ from tribo.diagnostics.gaps import gaps_of
 from tribo.diagnostics.model import Acting, setup
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.diagnostics.score_statistics import recorded_in_part
+from tribo.diagnostics.score_statistics import RecordedInPart, recorded_in_part
 from tribo.figures.extended_model import law_numbers_of
 from tribo.lawsearch.grammar import Shape, WrittenLaw, shapes_of
 from tribo.lawsearch.model_choice import FoundLaw
@@ -25,7 +25,7 @@ from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.conditions import Conditions
 from tribo.mechanisms.covariate import score
 from tribo.records import FloatArray, Ingested
-from tribo.wording.verdict_sentences import worded
+from tribo.wording.verdict_sentences import in_part_sentences, worded
 
 from .synthetic import hidden
 
@@ -174,6 +174,17 @@ def test_a_column_of_a_few_values_is_said_to_be_recorded_for_these() -> None:
     (left_out,) = [e for e in v.not_testable if e.mechanism == "temperature"]
     assert "the temperature is recorded for 7 of 96 tests only" in left_out.reason
     assert "not vary" not in left_out.reason
+
+
+def test_columns_recorded_for_the_same_share_are_said_in_one_sentence() -> None:
+    columns = (("temperature_C", 0.9, 0.5, False), ("humidity_pct", 0.9, 0.001, True), ("hold_s", 0.5, 0.5, False))
+    said = list(in_part_sentences([RecordedInPart(*each) for each in columns]))
+    assert said[:2] == [
+        "The temperature and the humidity are each recorded for 90 % of the tests.",
+        "The hold time is recorded for 50 % of the tests.",
+    ]
+    (doubt,) = said[2:]
+    assert "with and without a value of the humidity" in doubt
 
 
 def test_a_law_is_drawn_over_recorded_values_alone() -> None:

@@ -299,7 +299,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
             f"The patterned samples differ from the model by about {factor:.2g} times its stated error for patterns; a "
             f"true factor of {WITHIN:g} or less is excluded with p {p_text(p)}."
         )
-    yield from map(in_part_sentence, shows.in_part)
+    yield from in_part_sentences(shows.in_part)
     if shows.known:
         held = sum(answer.answer == "held" for _, answer in shows.known)
         yield f"{held} of {len(shows.known)} known laws held."
@@ -379,15 +379,20 @@ def scatter_in_words(scatter: RepeatScatter | None) -> str:
 # ------------------------------------------------------------------------------------------ without the model
 
 
-def in_part_sentence(gaps: RecordedInPart) -> str:
-    """For how many tests a column is recorded, and whether its gaps follow the friction."""
-    said = f"{sentence_case(in_words(gaps.column))} is recorded for {100.0 * gaps.share:.0f} % of the tests."
-    if gaps.doubted:
-        said += (
-            f" Tests with and without a value differ in friction (p {p_text(gaps.p)}): what is missing may depend on "
-            "the friction, and so may all that is said of this column."
-        )
-    return said
+def in_part_sentences(in_part: Sequence[RecordedInPart]) -> Iterator[str]:
+    """For how many tests columns are recorded, those of one share together; and whose gaps follow the friction."""
+    shares: dict[str, list[str]] = {}
+    for gaps in in_part:
+        shares.setdefault(f"{100.0 * gaps.share:.0f}", []).append(in_words(gaps.column))
+    for percent, names in shares.items():
+        recorded = f"is recorded for {percent} %" if len(names) == 1 else f"are each recorded for {percent} %"
+        yield f"{sentence_case(joined(names))} {recorded} of the tests."
+    for gaps in in_part:
+        if gaps.doubted:
+            yield (
+                f"Tests with and without a value of {in_words(gaps.column)} differ in friction (p {p_text(gaps.p)}): "
+                "what is missing may depend on the friction, and so may all that is said of this column."
+            )
 
 
 def _without_model(v: Verdict) -> Verdict:
