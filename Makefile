@@ -1,6 +1,7 @@
 # From a fresh clone with nothing but python3 and make:
 #   make demo    the main job on the bundled example, into out/demo
-#   make test    lint, types and tests
+#   make test    lint, types and the quick tests: every fact once, in minutes
+#   make test-all   the same with the slow tests: more seeds, samples and dialects, whole diagnoses; about an hour
 #   make docs    the documentation, into out/docs; warnings are errors, internal links are checked
 #   make blind   campaigns with hidden effects, about an hour on two cores; continues a run that was stopped
 #   make blind-laws   campaigns with hidden laws, about half an hour on two cores; continues a run that was stopped
@@ -18,7 +19,7 @@ PIP    := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-versio
 UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt
 unexport PYTHONDONTWRITEBYTECODE  # without bytecode in .venv every process compiles all that it imports
 
-.PHONY: demo test lint types pytest docs links bench blind blind-laws blind-layers mutants release hashes audit torture clean
+.PHONY: demo test test-all lint types pytest docs links bench blind blind-laws blind-layers mutants release hashes audit torture clean
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -45,6 +46,9 @@ pytest: $(VENV)/.dev
 test: lint
 	$(MAKE) -j 2 types pytest  # at once: mypy takes one process
 
+test-all: lint types $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
 $(VENV)/.docs: $(VENV)/.run
 	$(UV) -e '.[docs]' || $(PIP) -e '.[docs]'
 	touch $@
@@ -57,7 +61,6 @@ links: $(VENV)/.docs
 
 bench: $(VENV)/.dev
 	$(BIN)/tribo bench --large
-	$(BIN)/python -m pytest -m slow
 
 blind: $(VENV)/.dev
 	$(BIN)/python benchmarks/blind.py run out/blind.jsonl

@@ -7,12 +7,15 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from hypothesis import settings
 from on_the_command_line import run
-from support.campaigns import DIALECTS, MadeCampaign, small, write_made
+from support.campaigns import DESIGN, DIALECTS, MadeCampaign, small, write_made
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+Once = Callable[[str, Callable[[Path], object]], Path]
 
 # The same cases in every run; `make torture` draws others.
 settings.register_profile("repeatable", derandomize=True)
@@ -46,19 +49,18 @@ def practice(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], MadeCampaign]:
+def made(once: Once) -> Callable[[str], MadeCampaign]:
     """made("bluehill") -> a campaign of the virtual tribometer in that dialect, written once."""
-    base, written = tmp_path_factory.mktemp("made"), {}
 
-    def write(dialect: str) -> MadeCampaign:
-        if dialect not in written:
-            written[dialect] = write_made(base / dialect, dialect, seed=DIALECTS.index(dialect))
-        return written[dialect]
+    def write(folder: Path, dialect: str) -> None:
+        written = write_made(folder / "campaign", dialect, seed=DIALECTS.index(dialect))
+        written.truth.to_pickle(folder / "truth.pickle")
 
-    return write
+    def of(dialect: str) -> MadeCampaign:
+        folder = once(f"made_{dialect}", lambda part: write(part, dialect))
+        return MadeCampaign(folder / "campaign", pd.read_pickle(folder / "truth.pickle"), dict(DESIGN.laws))
 
-
-Once = Callable[[str, Callable[[Path], object]], Path]
+    return of
 
 
 @pytest.fixture(scope="session")

@@ -109,13 +109,16 @@ class MadeOnce:
         return once
 
 
+WHOLE_RUNS = ("write_report", "compare", "verify", "StudyOptions")
+
+
 @pytest.fixture(scope="module")
 def made_once() -> MadeOnce:
     return MadeOnce()
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in ("write_report", "compare") else n for n in EXPLAINED]
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in WHOLE_RUNS else n for n in EXPLAINED]
 )
 def test_the_example_of_a_public_name_gives_what_it_says(
     name: str, made_once: MadeOnce, monkeypatch: pytest.MonkeyPatch

@@ -51,11 +51,11 @@ def test_every_kind_of_damage_is_named_in_the_practice_campaigns_and_nothing_hea
 
 
 def test_a_fault_that_nobody_names_and_a_healthy_test_touched_are_told(
-    spoil_campaign: ModuleType, made: Callable[[str], MadeCampaign], tmp_path: Path
+    spoil_campaign: ModuleType, small_campaign: Path, tmp_path: Path
 ) -> None:
     """The benchmark itself can fail: a healthy test judged as spoiled, and two spoiled ones as healthy."""
-    healthy = ingest(load_campaign(made("bluehill").folder))
-    folder = Path(shutil.copytree(made("bluehill").folder, tmp_path / "spoiled"))
+    healthy = ingest(load_campaign(small_campaign))
+    folder = Path(shutil.copytree(small_campaign, tmp_path / "spoiled"))
     (folder / "raw" / "T002.csv").write_bytes(b"")
     lines = (folder / "raw" / "T005.csv").read_bytes().splitlines(keepends=True)
     (folder / "raw" / "T005.csv").write_bytes(b"".join(lines[:-100]))

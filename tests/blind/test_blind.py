@@ -51,6 +51,7 @@ def test_a_clear_effect_is_named(tmp_path: Path, effect: str, design: Design) ->
     assert [c.mechanism for c in v.causes] == [effect]
 
 
+@pytest.mark.slow
 def test_a_tied_pair_is_named_as_a_pair_with_a_test_that_parts_it(tmp_path: Path) -> None:
     v = verdict_on(tmp_path, 221, ("suction", 1.0))
     assert v.verdict == "named"
@@ -59,6 +60,7 @@ def test_a_tied_pair_is_named_as_a_pair_with_a_test_that_parts_it(tmp_path: Path
     assert v.next_test.expected_bits > 0.5
 
 
+@pytest.mark.slow
 def test_an_effect_outside_the_library_is_unknown_with_the_column_it_follows(tmp_path: Path) -> None:
     v = verdict_on(tmp_path, 231, ("outside:day", 1.5), design=Design(samples=("F", "B"), repeats=3))
     assert v.verdict == "unknown"

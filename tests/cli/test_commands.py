@@ -76,20 +76,19 @@ def test_json_of_report_carries_the_fits_and_no_talk(said: dict[str, Any]) -> No
 
 def test_nothing_is_written_into_the_campaign(small_campaign: Path, tmp_path: Path) -> None:
     before = digest(small_campaign)
-    assert run("fit", small_campaign, "-o", tmp_path / "out").exit_code == 0
+    assert run("ingest", small_campaign, "-o", tmp_path / "out").exit_code == 0
     assert digest(small_campaign) == before
 
 
-def test_a_zip_gives_the_same_tables_as_its_folder(small_campaign: Path, tmp_path: Path) -> None:
+def test_a_zip_gives_the_same_tables_as_its_folder(small_campaign: Path, small_report: Path, tmp_path: Path) -> None:
     archive = shutil.make_archive(str(tmp_path / "campaign"), "zip", small_campaign)
-    run("fit", small_campaign, "-o", tmp_path / "a")
-    run("fit", archive, "-o", tmp_path / "b")
+    run("fit", archive, "-o", tmp_path / "out")
     for name in ("tests.csv", "fits.csv"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+        assert (tmp_path / "out" / name).read_bytes() == (small_report / name).read_bytes()
 
 
 def test_faulty_tests_are_set_aside_and_listed_and_the_rest_stands(spoiled: Path, tmp_path: Path) -> None:
-    result = run("fit", spoiled, "-o", tmp_path / "out")
+    result = run("ingest", spoiled, "-o", tmp_path / "out")
     assert result.exit_code == 3
     assert "raw/T003.csv: the file is empty" in result.stderr
     assert "tests.csv, row 6, column sample" in result.stderr
@@ -104,7 +103,7 @@ def test_a_test_excluded_by_hand_is_no_fault(small_campaign: Path, tmp_path: Pat
     table = pd.read_csv(folder / "tests.csv")
     table["exclude"] = ["sled tipped over"] + [""] * (len(table) - 1)
     table.to_csv(folder / "tests.csv", index=False)
-    result = run("fit", folder, "-o", tmp_path / "out", "--json")
+    result = run("ingest", folder, "-o", tmp_path / "out", "--json")
     assert result.exit_code == 0
     (reason,) = (s["reason"] for s in json.loads(result.stdout)["set_aside"])
     assert "sled tipped over" in reason

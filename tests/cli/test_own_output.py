@@ -127,7 +127,7 @@ def test_with_force_results_stand_among_files_of_others(small_campaign: Path, tm
 def test_results_are_written_again_into_their_own_folder_and_beside_notes(small_campaign: Path, tmp_path: Path) -> None:
     assert run("ingest", small_campaign, "-o", tmp_path / "out").exit_code == 0
     (tmp_path / "out" / "overrides.csv").write_text("test_id,action,reason\n")
-    assert run("fit", small_campaign, "-o", tmp_path / "out").exit_code == 0
+    assert run("ingest", small_campaign, "-o", tmp_path / "out").exit_code == 0
     assert (tmp_path / "out" / "overrides.csv").is_file()
 
 

@@ -334,6 +334,7 @@ def suction_that_varies(s: Setup) -> np.ndarray:
     return whole
 
 
+@pytest.mark.slow
 def test_what_chance_would_give_a_mechanism_is_no_cause_however_certain_the_misfit() -> None:
     found = examine(made(steps, seed=0), replicates=FEW)
     assert found.verdict.verdict == "unknown"
@@ -342,6 +343,7 @@ def test_what_chance_would_give_a_mechanism_is_no_cause_however_certain_the_misf
     assert found.named.causes == ()
 
 
+@pytest.mark.slow
 def test_a_mechanism_whose_own_column_is_still_wrong_is_left_out_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(naming, "_misfit_in_own_column", lambda cause, *_: cause.name == "humidity")
     verdict = examine(made(acting("humidity", 0.03), seed=0), replicates=FEW).verdict
@@ -355,6 +357,7 @@ def of_two_halves() -> Diagnosis:
     return examine(made(half_and_half, seed=2), replicates=FEW)
 
 
+@pytest.mark.slow
 def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> None:
     """A swap among hundreds is stronger than chance makes any; pressure has no choices to pay for, but is within it."""
     found = of_two_halves()

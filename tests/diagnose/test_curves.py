@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from blind.tribometer import Design
+from support import first_quick
 
 from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.model import Setup
@@ -67,16 +68,17 @@ def test_a_curve_is_told_at_places_of_its_column_and_said_to_be_one(curve: Found
     assert len(curve.levels) == said.count("°C") == 7
 
 
-def test_a_formula_that_is_right_stays() -> None:
+@pytest.mark.parametrize("seed", first_quick([2, 5]))
+def test_a_formula_that_is_right_stays(seed: int) -> None:
     def warm(s: Setup) -> np.ndarray:
         t = s.observations.conditions.temperature_C
         return np.column_stack([np.zeros(len(t)), -0.03 * (t - 23.0) ** 2])
 
-    for seed in (2, 5):
-        (law,) = discover_laws(baseline(made(warm, seed=seed, design=DESIGN)), replicates=20).laws
-        assert law.law.shapes[0].kind in ("optimum", "hump")
+    (law,) = discover_laws(baseline(made(warm, seed=seed, design=DESIGN)), replicates=20).laws
+    assert law.law.shapes[0].kind in ("optimum", "hump")
 
 
+@pytest.mark.slow
 def test_a_law_of_two_of_four_samples_is_said_of_these() -> None:
     (law,) = discover_laws(baseline(made(on_two_samples, seed=2, design=DESIGN)), replicates=20).laws
     assert law.law.where == "samples A + Sx"
@@ -109,6 +111,7 @@ def hump_of_static_friction(s: Setup) -> np.ndarray:
     return np.column_stack([0.35 * np.exp(-0.5 * (np.log(p / 9e3) / 0.25) ** 2), np.zeros(len(p))])
 
 
+@pytest.mark.slow
 def test_a_mechanism_to_which_a_law_leaves_nothing_is_no_cause_beside_it() -> None:
     design = Design(samples=("F", "A", "B", "Sx"), masses_g=(12.0, 25.0, 50.0, 75.0, 100.0, 138.5))
     d = with_laws(examine(made(hump_of_static_friction, seed=1, design=design), replicates=(60, 40)))
@@ -118,6 +121,7 @@ def test_a_mechanism_to_which_a_law_leaves_nothing_is_no_cause_beside_it() -> No
     assert v.causes == ()
 
 
+@pytest.mark.slow
 def test_a_law_takes_the_place_of_the_misfit_of_its_column() -> None:
     d = with_laws(examine(made(two_humps, seed=2, design=DESIGN), replicates=(40, 40)))
     of_column = [m for m in d.verdict.misfits if "temperature" in m.covariate]

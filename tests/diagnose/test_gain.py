@@ -40,6 +40,7 @@ def test_specimens_left_out_score_as_the_density_they_were_drawn_from() -> None:
     assert np.mean(scores) == pytest.approx(expected, abs=0.5)
 
 
+@pytest.mark.slow
 def test_the_error_of_the_gain_is_its_spread_from_campaign_to_campaign() -> None:
     differences, errors = [], []
     for seed in range(10):

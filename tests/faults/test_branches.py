@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from support import first_quick
 
 from faults.branches import branch_trials, can_branch
 from faults.file_operations import KILL, Fault, Operation, errors_of
@@ -20,7 +21,7 @@ def both(at: int, operation: Operation) -> list[str]:
     return [errors_of(operation.kind)[0], KILL]
 
 
-@pytest.mark.parametrize("command", [careful, half_written, leaving, spoiling])
+@pytest.mark.parametrize("command", first_quick([half_written, careful, leaving, spoiling]))
 def test_branches_find_what_single_starts_find(place: Place, tmp_path: Path, command: Callable[[Place], int]) -> None:
     tried = bench(place, command)
     faults = [Fault(at, name) for at, o in enumerate(tried.operations) for name in both(at, o)]

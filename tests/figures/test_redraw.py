@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from on_the_command_line import run
+from support import first_quick
 
 from figures.test_figures import collisions
 from tribo.errors import CampaignError
@@ -18,7 +19,7 @@ from tribo.records import Study
 from tribo.report.drawings import _numbers, redrawn
 
 
-@pytest.mark.parametrize("width_mm", [90.0, 190.0])
+@pytest.mark.parametrize("width_mm", first_quick([90.0, 190.0]))
 @pytest.mark.parametrize("name", list(FIGURES))
 def test_no_label_lies_on_another_at_the_width_of_one_column_or_of_two(
     name: str, width_mm: float, study: Study
@@ -31,7 +32,7 @@ def test_no_label_lies_on_another_at_the_width_of_one_column_or_of_two(
         assert min(t.get_fontsize() for ax in figure.axes for t in (ax.xaxis.label, *ax.get_xticklabels())) >= 6
 
 
-@pytest.mark.parametrize("name", list(FIGURES))
+@pytest.mark.parametrize("name", first_quick(FIGURES, 3))
 def test_numbers_read_from_the_file_beside_a_figure_draw_the_same(name: str, study: Study) -> None:
     numbers = FIGURES[name].numbers(study)
     again = _numbers(csv_text(numbers))

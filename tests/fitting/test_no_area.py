@@ -56,6 +56,7 @@ def test_what_needs_a_pressure_says_that_the_area_is_not_stated(ingested: Ingest
         tribo.compare(without, tribo.fit(without))
 
 
+@pytest.mark.slow
 def test_the_report_of_a_campaign_without_an_area_states_forces(small_campaign: Path, tmp_path: Path) -> None:
     from on_the_command_line import run
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from support.campaigns import MadeCampaign
+from support.campaigns import DESIGN, write_made
 
 from tribo import stages
 from tribo.campaign import load_campaign
@@ -63,11 +64,11 @@ def test_a_difference_beyond_chance_has_a_small_p_and_names_its_specimens() -> N
     assert table["p"][2] < 0.05
 
 
-def test_a_fit_of_a_campaign_carries_the_difference_of_its_directions(
-    made: Callable[[str], MadeCampaign],
-) -> None:
-    options = stages.StudyOptions()
-    study = stages.study(load_campaign(made("testxpert").folder), options, until="fit")
+def test_a_fit_of_a_campaign_carries_the_difference_of_its_directions(tmp_path: Path) -> None:
+    laws = {name: DESIGN.laws[name] for name in ("F", "Sx", "Sy")}
+    few = replace(DESIGN, laws=laws, masses_g=(5.0, 50.0, 138.5), repeats=1)
+    made = write_made(tmp_path / "made", "testxpert", seed=1, design=few)
+    study = stages.study(load_campaign(made.folder), until="fit")
     assert study.differences is not None
     assert set(study.differences["sample"] + study.differences["other"]) == {"SxSy"}
     assert len(study.differences) == 6

@@ -26,10 +26,10 @@ def allow_forks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 
-def test_two_processes_read_the_same_bits_as_one(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_two_processes_read_the_same_bits_as_one(monkeypatch, small_campaign: Path) -> None:  # type: ignore[no-untyped-def]
     allow_forks(monkeypatch)
-    campaign = load_campaign(EXAMPLE)
-    assert len(campaign.tests) >= exports.FEWEST_FOR_PROCESSES
+    campaign = load_campaign(small_campaign)
+    monkeypatch.setattr(exports, "FEWEST_FOR_PROCESSES", len(campaign.tests))
     one, two = stages.ingest(campaign), stages.ingest(campaign, jobs=2)
     assert list(one.pulls) == list(two.pulls)
     for test_id, trace in one.traces.items():
@@ -37,11 +37,14 @@ def test_two_processes_read_the_same_bits_as_one(monkeypatch) -> None:  # type: 
         assert exact_text(one.pulls[test_id]) == exact_text(two.pulls[test_id])
 
 
-def test_faults_come_back_from_the_processes_too(monkeypatch, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_faults_come_back_from_the_processes_too(
+    monkeypatch: pytest.MonkeyPatch, small_campaign: Path, tmp_path: Path
+) -> None:
     import shutil
 
     allow_forks(monkeypatch)
-    shutil.copytree(EXAMPLE, tmp_path / "campaign")
+    monkeypatch.setattr(exports, "FEWEST_FOR_PROCESSES", 2)
+    shutil.copytree(small_campaign, tmp_path / "campaign")
     (tmp_path / "campaign" / "raw" / "T005.csv").write_bytes(b"")
     ingested = stages.ingest(load_campaign(tmp_path / "campaign"), jobs=2)
     (fault,) = ingested.set_aside

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from on_the_command_line import digest, run
 from report.laid_out import html
+from support import first_quick
 from support.sled import SledDesign, SledLaw, write_campaign
 
 from mistakes.cases import MISTAKES
@@ -52,6 +53,11 @@ def right(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return written(tmp_path_factory.mktemp("right") / "campaign", (25.0, 138.5), 2)
 
 
+@pytest.fixture(scope="module")
+def with_siblings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("siblings") / "campaign", (12.0, 25.0, 50.0, 90.0, 138.5), 3)
+
+
 @pytest.fixture
 def campaign(right: Path, tmp_path: Path) -> Path:
     shutil.copytree(right, tmp_path / "campaign")
@@ -59,13 +65,10 @@ def campaign(right: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def spoiled(mistake: Mistake, right: Path, tmp_path: Path) -> tuple[object, ...]:
+def spoiled(mistake: Mistake, right: Path, with_siblings: Path, tmp_path: Path) -> tuple[object, ...]:
     """What a command is given once the mistake is made: the campaign, or what ``make`` says."""
     folder = tmp_path / "campaign"
-    if mistake.with_siblings:
-        written(folder, (12.0, 25.0, 50.0, 90.0, 138.5), 3)
-    else:
-        shutil.copytree(right, folder)
+    shutil.copytree(with_siblings if mistake.with_siblings else right, folder)
     return tuple(mistake.make(folder) or (folder,))
 
 
@@ -93,7 +96,7 @@ def test_a_dry_run_names_the_place_and_the_remedy_of_a_mistake(
 
 
 @pytest.mark.parametrize(
-    "mistake", [m for m in MISTAKES if 0 in m.status], ids=lambda mistake: mistake.name.replace(" ", "_")
+    "mistake", first_quick(m for m in MISTAKES if 0 in m.status), ids=lambda mistake: mistake.name.replace(" ", "_")
 )
 def test_a_run_that_ends_with_status_0_says_what_is_absurd(
     mistake: Mistake, spoiled: tuple[object, ...], tmp_path: Path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -35,12 +36,19 @@ def test_a_second_command_into_one_folder_ends_with_status_75(
     assert f"process {first.pid} on " in problem["found"]
 
 
+@pytest.fixture(scope="module")
+def fitted(small_campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `tribo fit` writes of the small campaign."""
+    out = tmp_path_factory.mktemp("fitted") / "out"
+    assert CliRunner().invoke(main, ["fit", str(small_campaign), "-o", str(out)]).exit_code == 0
+    return out
+
+
 @pytest.mark.parametrize("name", ["card.json", "diagnosis.csv", "layers.csv", "law-1.toml", "figures/a.svg"])
 def test_a_users_own_file_of_the_name_of_a_product_is_not_replaced(
-    small_campaign: Path, tmp_path: Path, name: str
+    small_campaign: Path, fitted: Path, tmp_path: Path, name: str
 ) -> None:
-    said = CliRunner().invoke(main, ["fit", str(small_campaign), "-o", str(tmp_path / "out")])
-    assert said.exit_code == 0
+    shutil.copytree(fitted, tmp_path / "out")
     own = tmp_path / "out" / name
     own.parent.mkdir(exist_ok=True)
     own.write_text("not from tribo")

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from support import first_quick
 
 from report.conftest import PROVENANCE, Written
 from tribo.files import whole_file, write_text
@@ -31,11 +32,14 @@ def test_out_holds_the_agreed_files(written: Written) -> None:
     }  # fmt: skip
 
 
-def test_the_same_study_gives_the_same_bytes(written: Written, study: Study, tmp_path: Path) -> None:
-    write_report(study, tmp_path, provenance=PROVENANCE)
-    names = [p.relative_to(tmp_path) for p in tmp_path.rglob("*") if p.is_file() and p.suffix != ".nc"]
+@pytest.mark.parametrize("name", first_quick(["measured", "study"]))
+def test_the_same_study_gives_the_same_bytes(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    first, again = tmp_path / "first", tmp_path / "again"
+    for folder in (first, again):
+        write_report(request.getfixturevalue(name), folder, provenance=PROVENANCE)
+    names = [p.relative_to(first) for p in first.rglob("*") if p.is_file() and p.suffix != ".nc"]
     assert len(names) > 20
-    assert not [name for name in names if (tmp_path / name).read_bytes() != (written.out / name).read_bytes()]
+    assert not [name for name in names if (first / name).read_bytes() != (again / name).read_bytes()]
 
 
 def test_a_file_that_takes_over_earlier_groups_has_the_same_bytes(study: Study, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import pytest
+from support import first_quick
 
 from report.laid_out import html, pdf
 from report.synthetic import make_study
@@ -169,7 +170,7 @@ def test_the_index_page_shows_every_text_and_is_made_of_nothing_else() -> None:
     assert shown(found.words) == set(TEXTS)
 
 
-@pytest.mark.parametrize("name", ["fig4", "fig5", "fig8"])
+@pytest.mark.parametrize("name", first_quick(["fig4", "fig5", "fig8"]))
 def test_a_figure_stays_well_formed_and_holds_the_texts_as_text(name: str) -> None:
     figure = FIGURES[name]
     drawn = figure.draw(figure.numbers(make_study(TEXTS, n_specimens=1, n_samples=60)))

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 from numba import njit, typeof, types
-from support import dense_engine as dense
+from support import dense_engine as dense, first_quick
 
 from tribo.errors import SimulationError
 from tribo.records import FloatArray
@@ -73,7 +73,7 @@ def plain_steps(cells: FloatArray, steps: int, lattice: Lattice, drive_: SliderD
 
 @pytest.mark.parametrize("terms", [FrictionTerms(), FrictionTerms(ageing_b=0.05, ageing_t0_s=1e-6, speed_a=0.02)])
 @pytest.mark.parametrize(("sample", "edges"), [("F", "free"), ("C", "free"), ("B", "periodic")])
-@pytest.mark.parametrize("engine", ["fast", "dense"])
+@pytest.mark.parametrize("engine", first_quick(["fast", "dense"]))
 def test_a_compiled_step_is_the_plain_step(engine: str, sample: str, edges: str, terms: FrictionTerms):
     """Blocks that start, slide and stop, with and without friction terms: the same to rounding."""
     config = SimConfig(

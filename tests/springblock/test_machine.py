@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support import first_quick
 from support.energy_balance import energy_balance
 
 from tribo.errors import SimulationError
@@ -57,7 +58,9 @@ def test_a_stiffer_machine_comes_closer_to_a_rigid_one():
 
 @pytest.mark.parametrize(
     ("sample", "changes"),
-    [("F", {}), ("C", {}), ("C", ELASTIC), ("A", {"pulled_edge": "trailing"}), ("C", {"rotation": "finite"})],
+    first_quick(
+        [("F", {}), ("C", {"rotation": "finite"}), ("C", {}), ("C", ELASTIC), ("A", {"pulled_edge": "trailing"})], 2
+    ),
 )
 def test_readable_twin_has_the_same_peak_and_energy_is_conserved(sample: str, changes: dict[str, object]):
     """With a machine as stiff as the layer: peaks within 0.1 %, the first four blocks, the energy closed to 0.05 %."""

@@ -202,7 +202,7 @@ sys.path.insert(0, {folder!r})
 from test_resume import design
 from tribo.springblock import kept_runs, run_stored
 kept_runs.WRITE_EVERY_S = 0.0
-run_stored(design(20), {store!r}, jobs=2, progress=lambda done, total: print(done, flush=True))
+run_stored(design(6), {store!r}, jobs=2, progress=lambda done, total: print(done, flush=True))
 """
 
 
@@ -224,12 +224,12 @@ def test_a_killed_ensemble_goes_on_where_it_was(tmp_path: Path):
     assert 7 <= done < len(before)
     assert before.loc[before["done"], RESULTS].notna().all().all()
     seen: list[int] = []
-    table = run_stored(design(20), store, progress=lambda count, _: seen.append(count))
+    table = run_stored(design(6), store, progress=lambda count, _: seen.append(count))
     assert seen[0] == done
     assert table["done"].all()
     kept = before["done"]
     pd.testing.assert_frame_equal(table.loc[kept, RESULTS], before.loc[kept, RESULTS], check_exact=True)
-    some = design(20)[::9]
+    some = design(6)[::9]
     pd.testing.assert_frame_equal(
         table[RESULTS][::9].reset_index(drop=True), run_ensemble(some)[RESULTS], check_exact=True
     )

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 
-def first_quick(cases: Iterable[Any]) -> list[Any]:
-    """These cases of a test: the first runs in ``make test``, the others with all slow ones in ``make bench``."""
+def first_quick(cases: Iterable[Any], quick: int = 1) -> list[Any]:
+    """These cases of a test: the first ``quick`` run in ``make test``, with all others in ``make test-all``."""
     rows = [case if isinstance(case, tuple) else (case,) for case in cases]
-    return [pytest.param(*row) if n == 0 else pytest.param(*row, marks=pytest.mark.slow) for n, row in enumerate(rows)]
+    return [pytest.param(*row, marks=pytest.mark.slow if n >= quick else ()) for n, row in enumerate(rows)]

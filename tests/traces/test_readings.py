@@ -163,6 +163,6 @@ def test_static_friction_that_grows_with_the_hold_heals_by_so_much_a_decade() ->
     assert [r.hold_s for r in found if r.name == "hold"] == [1.0, 10.0, 100.0, 1000.0]
 
 
-def test_one_pull_from_rest_has_no_further_readings() -> None:
-    ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+def test_one_pull_from_rest_has_no_further_readings(small_campaign: Path) -> None:
+    ingested = tribo.ingest(tribo.load_campaign(small_campaign))
     assert ingested.readings == ()
