@@ -137,12 +137,16 @@ def module_name(module: Path) -> str:
     return ".".join(module.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
+@cache
 def at_run_time(tree: ast.AST) -> list[ast.AST]:
     """Every node but those under ``if TYPE_CHECKING``."""
     nodes: list[ast.AST] = []
-    for child in ast.iter_child_nodes(tree):
-        if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
-            nodes += [child, *at_run_time(child)]
+    ahead = [tree]
+    while ahead:
+        for child in ast.iter_child_nodes(ahead.pop()):
+            if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
+                nodes.append(child)
+                ahead.append(child)
     return nodes
 
 

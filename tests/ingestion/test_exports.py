@@ -64,13 +64,15 @@ def test_a_displacement_that_does_not_run_at_the_speed_of_the_test_is_doubted() 
         assert ("off_speed" in pull.flags) is ("off_speed" in {p.kind for p in pull.problems}) is doubted
 
 
-def test_a_doubt_stands_in_the_table_with_its_row_and_can_be_found_on_the_trace(tmp_path: Path) -> None:
+def test_a_doubt_stands_in_the_table_with_its_row_and_can_be_found_on_the_trace(
+    small_campaign: Path, tmp_path: Path
+) -> None:
     import shutil
 
     from tribo.records import Study
     from tribo.report.tables import tests_table
 
-    shutil.copytree(EXAMPLE, tmp_path / "campaign")
+    shutil.copytree(small_campaign, tmp_path / "campaign")
     path = tmp_path / "campaign" / "raw" / "T005.csv"
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     row = len(lines) - 60
