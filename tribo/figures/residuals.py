@@ -62,7 +62,7 @@ Panel = tuple[str, str, Covariate, np.ndarray, float]  # observable, title, cova
 
 def _panels(d: Diagnosis) -> list[Panel]:
     """The samples, if they differ from the model by more than its stated error; then the strongest contrast with each
-    covariate and sample."""
+    covariate and sample that is significant, or the three that come closest where nothing is."""
     s, conditions = d.screened, d.baseline.setup.observations.conditions
     found: dict[tuple[str, str], Panel] = {}
     for k in np.argsort(-s.strength):
@@ -75,13 +75,13 @@ def _panels(d: Diagnosis) -> list[Panel]:
             found.setdefault(key, (_observable(contrast), _title(contrast), column, here, p))
         if len(found) == MOST_PANELS:
             break
-    strongest = [panel for panel in found.values() if panel[-1] < 0.05] or list(found.values())[:3]
+    strongest = [panel for panel in found.values() if panel[-1] < 0.05]
     if not pattern_differences(d):
-        return strongest
+        return strongest or list(found.values())[:3]
     every = np.ones(len(conditions.sample), bool)
-    means: Panel = ("both", "Means", covariate(d.baseline.setup, "sample"), every, d.verdict.shows.excess[1])
-    certain = any(panel[-1] < 0.05 for panel in strongest)
-    return [means, *strongest[: MOST_PANELS - 1 if certain else 2]]
+    by_sample = covariate(d.baseline.setup, "sample")
+    means: Panel = ("both", "Means of the samples", by_sample, every, d.verdict.shows.excess[1])
+    return [means, *strongest[: MOST_PANELS - 1]]
 
 
 def _tests_and_covariate(d: Diagnosis, contrast: Contrast) -> tuple[Covariate, np.ndarray] | None:
