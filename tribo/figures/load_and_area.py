@@ -20,6 +20,7 @@ from tribo.comparison.findings import ratios_of
 from tribo.errors import Problem, TriboError
 from tribo.figures import style
 from tribo.records import REGIMES, FloatArray, LawFit, Regime, Study
+from tribo.wording.numerals import true_minus
 
 RATIO_COLUMNS = [
     "sample_number",
@@ -196,7 +197,7 @@ def draw_force(numbers: pd.DataFrame) -> Figure:
         style.panel_title(ax, first["sample"], f"AF = {first['area_fraction']:.2f}")
         lowest, highest = float(sample["T_low_N"].min()), float(sample["T_high_N"].max())
         if highest > high or lowest < low:  # where a band leaves the panel, how far it reaches
-            text = f"95 % band from {lowest:.3g} to {highest:.3g} N".replace("-", "−")
+            text = true_minus(f"95 % band from {lowest:.3g} to {highest:.3g} N")
             ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top", fontsize=6.5, color=style.VERMILLION)
     panels[0][0].set(xlim=(0, None), ylim=(low, high))
     style.legend_below(figure, _force_legend(numbers), columns=4)

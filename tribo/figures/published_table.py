@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from tribo.figures import style
 from tribo.figures.misfit import mechanism_label
 from tribo.records import REGIMES
+from tribo.wording.numerals import true_minus
 
 if TYPE_CHECKING:
     from tribo.berardo2019.table_diagnosis import PublishedDiagnosis, TableReading
@@ -152,7 +153,7 @@ def draw_readings(numbers: pd.DataFrame) -> Figure:
 
 def _readings_axes(ax: Axes, readings: pd.DataFrame, mechanisms: list[str], n_guesses: int) -> None:
     labels = [
-        f"{'paper' if r['model'] == 'paper' else 'tribo'}, ρ = {r['correlation']:.2f}".replace("-", "−")
+        true_minus(f"{'paper' if r['model'] == 'paper' else 'tribo'}, ρ = {r['correlation']:.2f}")
         + (", SD of 3" if r["specimens"] == 3 else "")
         + f"   {str(r['outcome']).replace('_', ' ')}"
         for r in readings.to_dict("records")

@@ -16,6 +16,7 @@ from tribo.comparison import findings
 from tribo.figures import style
 from tribo.figures.one_pull import thin_trace
 from tribo.records import FloatArray, Run, Study
+from tribo.wording.numerals import true_minus
 
 PATTERN_COLUMNS = [
     "cavity", "size_x_um", "size_y_um", "pitch_x_um", "pitch_y_um", "staggered", "domain_x_um", "domain_y_um",
@@ -249,7 +250,7 @@ def _draw_traces(ax: Axes, runs: list[tuple[int, pd.DataFrame]], numbers: pd.Dat
 
 
 def _angle(angle_deg: float) -> str:
-    return f"{angle_deg:.3g}°".replace("-", "−")
+    return true_minus(f"{angle_deg:.3g}°")
 
 
 SIMULATED_PULLS = style.StudyFigure(

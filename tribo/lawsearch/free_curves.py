@@ -21,10 +21,10 @@ from tribo.lawsearch.grammar import (
     MOST_VALUES,
     PRESSURES,
     UNITS,
-    WIDE,
     Shape,
     WrittenLaw,
     column_values,
+    logarithmic,
     recorded_values,
 )
 from tribo.mechanisms.record import Conditions
@@ -49,7 +49,7 @@ def curve_of(column: str, c: Conditions) -> Shape | None:
     if len(np.unique(x)) <= MOST_VALUES:
         return None
     low, high = float(x.min()), float(x.max())
-    spaced = np.geomspace if low > 0 and high / low > WIDE else np.linspace
+    spaced = np.geomspace if logarithmic(low, high) else np.linspace
     places = tuple(float(p) for p in spaced(low, high, KNOTS))
     return Shape("curve", column, low, high, values=(low, *places[1:-1], high), heights=(0.0,) * KNOTS)
 
@@ -64,7 +64,7 @@ def knots_of(column: str, c: Conditions) -> Shape | None:
     if len(values) < 2 or not enough_recorded(len(x), len(c.sample)):
         return None
     low, high = float(values[0]), float(values[-1])
-    spaced = np.geomspace if low > 0 and high / low > WIDE else np.linspace
+    spaced = np.geomspace if logarithmic(low, high) else np.linspace
     places = values if len(values) <= ALONG else spaced(low, high, ALONG)
     return Shape("surface", column, low, high, values=(low, *(float(p) for p in places[1:-1]), high))
 
@@ -72,7 +72,7 @@ def knots_of(column: str, c: Conditions) -> Shape | None:
 def kernels(shape: Shape) -> list[FloatArray]:
     """Covariances between the knots of a column, smooth and rough, for each of the lengths."""
     at = np.array(shape.values, float)
-    place = np.log(at) if shape.low > 0 and shape.high / shape.low > WIDE else at
+    place = np.log(at) if logarithmic(shape.low, shape.high) else at
     place = (place - place[0]) / (place[-1] - place[0])
     apart = np.abs(place[:, None] - place)
     found = []

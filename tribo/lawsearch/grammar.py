@@ -344,6 +344,11 @@ def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[
     return found + [(both, cost) for both in products]
 
 
+def logarithmic(low: float, high: float) -> bool:
+    """Whether a column between these values is looked at in its logarithm too."""
+    return low > 0 and high / low > WIDE
+
+
 def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
     low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
     if name == "clock_h":
@@ -352,7 +357,7 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
             yield from _waves(name, low, high, 1.0)
         return
     yield Shape("linear", name, low, high, place=0.5 * (low + high))
-    if low > 0 and high / low > WIDE:
+    if logarithmic(low, high):
         yield Shape("log", name, low, high, place=float(np.sqrt(low * high)))
     if len(distinct) > 2:
         between = 0.5 * (distinct[1:] + distinct[:-1])
@@ -360,7 +365,7 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
         yield from (Shape("step", name, low, high, place=float(p)) for p in places)
     if 2 < len(distinct) <= MOST_VALUES:
         yield from (Shape("level", name, low, high, place=float(v)) for v in distinct[1:-1])
-    if len(distinct) > 4 and low > 0 and high / low > WIDE:
+    if len(distinct) > 4 and logarithmic(low, high):
         for share in (0.2, 0.35, 0.5, 0.65, 0.8):
             yield Shape("log optimum", name, low, high, place=float(low * (high / low) ** share))
     if len(distinct) > 4:

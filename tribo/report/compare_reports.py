@@ -24,7 +24,7 @@ from tribo.errors import CampaignError, Problem, failed_by_system
 from tribo.files import bytes_of, text_of
 from tribo.outputs import product
 from tribo.report.provenance import Provenance, write_results
-from tribo.wording.numerals import significant
+from tribo.wording.numerals import significant, true_minus
 
 SHOWN = ("finding", "agreement", "fig4", "fig6", "fig7", "fig8", "misfit", "evidence", "dependence")
 READ = ("fits.csv", "tests.csv")
@@ -229,5 +229,5 @@ def _cells(row: dict[Any, Any]) -> dict[str, Any]:
     return {
         "sample": row["sample"], "regime": row["regime"], "quantity": f"{symbol} ({unit})" if unit != "1" else symbol,
         "first": between("first"), "second": between("second"), "difference": between("difference"),
-        "percent": f"{percent:+.1f}".replace("-", "−") if math.isfinite(percent) else "–", "distinct": row["distinct"],
+        "percent": true_minus(f"{percent:+.1f}") if math.isfinite(percent) else "–", "distinct": row["distinct"],
     }  # fmt: skip

@@ -19,7 +19,7 @@ from tribo.report.provenance import Provenance
 from tribo.report.pulls import pull_cards
 from tribo.wording import study_sentences as wording
 from tribo.wording.card import Card, card_of, fit_cells
-from tribo.wording.numerals import joined, significant
+from tribo.wording.numerals import joined, significant, true_minus
 from tribo.wording.verdict_sentences import verdict_in_words
 
 # the first that there is shows what the card says
@@ -172,7 +172,7 @@ def _calibration(study: Study) -> list[tuple[str, str, str]]:
     rows = []
     for name, value in study.comparison.calibration.items() if study.comparison is not None else ():
         words, unit = CALIBRATED.get(name, (name.replace("_", " "), unit_of(name) or "1"))
-        rows.append((words, f"{float(value):.5g}".replace("-", "−"), unit))
+        rows.append((words, true_minus(f"{float(value):.5g}"), unit))
     return rows
 
 

@@ -34,7 +34,7 @@ from tribo.records import FloatArray
 from tribo.site.history import CampaignRow, Interval, Key, answers_of, history, laws_csv, laws_in_words
 from tribo.site.steps import INDEX, Step, noted, read_record
 from tribo.user_text import for_spreadsheet
-from tribo.wording.numerals import p_text
+from tribo.wording.numerals import p_text, true_minus
 
 if TYPE_CHECKING:
     from tribo.report.compare_reports import Reported
@@ -299,11 +299,11 @@ def _range(intervals: Sequence[Interval]) -> tuple[float, float]:
 def ticks(low: float, high: float) -> tuple[tuple[float, str], ...]:
     """Values and labels at the foot, the middle and the head of an axis, with as many decimals as part them."""
     decimals = max(0, 1 - math.floor(math.log10((high - low) / 2)))
-    return tuple((v, f"{v:.{decimals}f}".replace("-", "−")) for v in (low, (low + high) / 2, high))
+    return tuple((v, true_minus(f"{v:.{decimals}f}")) for v in (low, (low + high) / 2, high))
 
 
 def _short(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
+    return true_minus(f"{value:.3g}")
 
 
 def change_sentence(key: Key, change: Change, rows: Sequence[CampaignRow]) -> str:

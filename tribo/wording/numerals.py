@@ -14,7 +14,7 @@ def significant(value: float, digits: int = 3) -> str:
     if value == 0:
         return "0"
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
-    return _signed(f"{value:.{decimals}f}")
+    return true_minus(f"{value:.{decimals}f}")
 
 
 def with_uncertainty(value: float, u: float) -> str:
@@ -25,7 +25,7 @@ def with_uncertainty(value: float, u: float) -> str:
     if value:
         decimals = min(decimals, max(0, 4 - math.floor(math.log10(abs(value)))))
     shown_u = f"{u:.{decimals}f}" if u >= 0.5 * 10.0**-decimals else f"<{10.0**-decimals:.{decimals}f}"
-    return _signed(f"{value:.{decimals}f} ± {shown_u}")
+    return true_minus(f"{value:.{decimals}f} ± {shown_u}")
 
 
 def span(values: list[float], digits: int = 2) -> str:
@@ -34,7 +34,7 @@ def span(values: list[float], digits: int = 2) -> str:
     if not finite:
         return "–"
     low, high = f"{min(finite):.{digits}f}", f"{max(finite):.{digits}f}"
-    return _signed(low if low == high else f"{low} to {high}")
+    return true_minus(low if low == high else f"{low} to {high}")
 
 
 def ratio_text(value: float) -> str:
@@ -53,7 +53,7 @@ def unbroken(sentence: str) -> str:
 def percent(fraction: float) -> str:
     """A fraction in whole percent, one decimal below 3 %."""
     value = 100 * fraction
-    return _signed(f"{value:.1f} %" if abs(value) < 2.95 else f"{value:.0f} %")
+    return true_minus(f"{value:.1f} %" if abs(value) < 2.95 else f"{value:.0f} %")
 
 
 def joined(words: list[str]) -> str:
@@ -75,7 +75,7 @@ def counted(number: int, noun: str) -> str:
 
 def signed(value: float) -> str:
     """ "−57", "+8": a percentage in whole numbers with its sign; a dash where there is none."""
-    return f"{value:+.0f}".replace("-", "−") if math.isfinite(value) else "–"
+    return true_minus(f"{value:+.0f}") if math.isfinite(value) else "–"
 
 
 def interval(low: float, high: float) -> str:
@@ -85,10 +85,11 @@ def interval(low: float, high: float) -> str:
 
 def general(value: float) -> str:
     """ "−6.13", "25": up to four digits, with a true minus sign."""
-    return _signed(f"{value:.4g}")
+    return true_minus(f"{value:.4g}")
 
 
-def _signed(text: str) -> str:
+def true_minus(text: str) -> str:
+    """Numbers in a text with the sign of typography in place of the hyphen."""
     return text.replace("-", "−")
 
 

@@ -12,7 +12,17 @@ from tribo.comparison import findings
 from tribo.comparison.findings import Agreement, Ranking, Verdict, all_set_aside, shown
 from tribo.records import PA_PER_KPA, REGIMES, Campaign, LawFit, Override, Pull, Study, Test
 from tribo.vocabulary import label_with_unit
-from tribo.wording.numerals import counted, joined, loads_in_words, p_text, percent, significant, span, with_uncertainty
+from tribo.wording.numerals import (
+    counted,
+    joined,
+    loads_in_words,
+    p_text,
+    percent,
+    significant,
+    span,
+    true_minus,
+    with_uncertainty,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -310,7 +320,7 @@ def friction_sentence(study: Study) -> str:
         if off:
             worst = max((load for a in off for load in a.loads), key=lambda load: abs(load.deviation))
             a = next(a for a in off if worst in a.loads)
-            value, low, high = (f"{100 * (x - 1):+.0f}".replace("-", "−") for x in (worst.ratio, worst.low, worst.high))
+            value, low, high = (true_minus(f"{100 * (x - 1):+.0f}") for x in (worst.ratio, worst.low, worst.high))
             return (
                 f"Measured friction differs most from the model for {a.regime} friction of {a.sample} at "
                 f"{significant(worst.normal_load_N)} N, by {value} % (95 % interval {low} to {high} %); no diagnosis "
