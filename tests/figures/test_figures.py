@@ -108,6 +108,7 @@ def collisions(figure: Figure) -> list[tuple[str, str]]:
     return out + pairs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_no_label_lies_outside_the_figure_or_on_another(name: str, study: Study) -> None:
     assert collisions(FIGURES[name].draw(FIGURES[name].numbers(study))) == []

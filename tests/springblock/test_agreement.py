@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from support import first_quick
 
 from tribo.springblock import SimConfig
 from tribo.springblock.engines.fast import integrate as run_fast
@@ -41,13 +42,11 @@ def test_flat_peak_and_first_five_failures_are_those_of_the_reference(pressure_P
 
 @pytest.mark.parametrize(
     ("sample", "pressure_Pa", "angle_deg", "shape"),
-    [
-        ("A", 5e3, 33.0, {"blocks": (17, 17)}),
-        ("B", 25e3, 70.0, {"blocks": (17, 17)}),
-        ("C", 3e3, 12.0, {"blocks": (17, 17)}),
-        ("Sx", 3e3, -5.0, ONE_CAVITY_OF_S),
-        ("Sy", 3e3, 96.0, {**ONE_CAVITY_OF_S, "peak_rule": "first"}),
-    ],
+    first_quick(
+        [("C", 3e3, 12.0, {"blocks": (17, 17)}), ("Sy", 3e3, 96.0, {**ONE_CAVITY_OF_S, "peak_rule": "first"}),
+         ("A", 5e3, 33.0, {"blocks": (17, 17)}), ("B", 25e3, 70.0, {"blocks": (17, 17)}),
+         ("Sx", 3e3, -5.0, ONE_CAVITY_OF_S)], 2
+    ),
 )
 def test_patterned_peak_is_that_of_the_reference(sample: str, pressure_Pa: float, angle_deg: float, shape: dict):
     """Static friction within 0.1 % at the default rest tolerance: the highest force, on Sy the first peak.
