@@ -426,7 +426,6 @@ def test_a_column_of_few_values_is_told_by_its_values_whatever_the_shape() -> No
     assert "above" not in law_sentence(dip)
 
 
-@pytest.mark.slow
 def test_the_formulas_that_pass_through_the_values_are_listed_and_no_other() -> None:
     kinds = {tie.shapes[0].kind for tie in by_values(lambda v: -0.05 * np.log(v / 0.1) ** 2, FIVE).ties}
     assert "log optimum" in kinds

@@ -32,7 +32,6 @@ def test_a_form_is_off_by_a_function_of_the_column_that_drives_it(name: str) -> 
     assert len(np.unique(g.round(9))) <= len(np.unique(column))
 
 
-@pytest.mark.slow
 def test_nuisance_weakens_what_the_observer_sees_of_an_effect() -> None:
     hide, rng = hide_effect("temperature", 1.0), stream(23, HIDDEN)
     free = strengths(23, SMALL, (), hide, rng)
