@@ -1,7 +1,7 @@
 # From a fresh clone with nothing but python3 and make:
 #   make demo    the main job on the bundled example, into out/demo
 #   make test    lint, types and the quick tests: every fact once, in minutes
-#   make test-all   the same with the slow tests: more seeds, samples and dialects, whole diagnoses; about an hour
+#   make test-all   the same with the slow tests: more seeds, samples and dialects, whole diagnoses; takes longer
 #   make docs    the documentation, into out/docs; warnings are errors, internal links are checked
 #   make blind   campaigns with hidden effects, about an hour on two cores; continues a run that was stopped
 #   make blind-laws   campaigns with hidden laws, about half an hour on two cores; continues a run that was stopped
