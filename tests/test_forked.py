@@ -112,3 +112,44 @@ def test_a_function_apart_ends_with_the_process_that_watches_it() -> None:
     while runs(child):
         assert time.monotonic() < until, "it runs on"
         time.sleep(0.05)
+
+
+BESIDE = """
+import json, os, sys, time
+from tribo.forked import beside
+
+def number():
+    print("begun", os.getpid(), flush=True)
+    return os.getpid()
+
+def fails_there():
+    if os.getpid() != HERE:
+        raise OSError("not here")
+    return "done here"
+
+def crashes_there():
+    if os.getpid() != HERE:
+        os.abort()
+    return "done here"
+
+HERE = os.getpid()
+found = {}
+with beside(number) as result:
+    found["other"] = result() != HERE
+for function in (fails_there, crashes_there):
+    with beside(function) as result:
+        found[function.__name__] = result()
+try:
+    with beside(lambda: time.sleep(600)) as result:
+        raise ValueError
+except ValueError:
+    found["left"] = True
+print(json.dumps(found))
+"""
+
+
+def test_what_runs_beside_gives_its_result_and_is_done_here_where_its_process_failed() -> None:
+    done = subprocess.run([sys.executable, "-c", BESIDE], capture_output=True, text=True, timeout=120, check=True)
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found == {"other": True, "fails_there": "done here", "crashes_there": "done here", "left": True}
+    assert done.stderr == ""

@@ -1,4 +1,5 @@
-"""The same function over many items, on several processes where that is safe and pays; one function with limits."""
+"""The same function over many items, on several processes where that is safe and pays; one function
+with limits, or beside others."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
@@ -78,17 +79,7 @@ def apart(function: Callable[[], R], limits: Limits) -> R:
     """
     if not may_fork():
         return function()
-    reading, writing = os.pipe()
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError, AttributeError):
-            stream.flush()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        child = os.fork()
-    if not child:
-        os.close(reading)
-        _run_apart(function, writing, limits)
-    os.close(writing)
+    child, reading = _begun(function, limits)
     found = b""
     over: ApartError | None = None
     try:
@@ -110,6 +101,58 @@ def apart(function: Callable[[], R], limits: Limits) -> R:
     raise ApartError("crashed", f"the process that worked on it crashed ({how})")
 
 
+@contextmanager
+def beside(function: Callable[[], R]) -> Iterator[Callable[[], R]]:
+    """A function begun in a forked process; what is given waits for its result, which has to be picklable.
+
+    The function runs here when it is waited for, where processes cannot be forked, and again where the process ended
+    without a result, so that an error is raised as if there were no process. The process ends with this one.
+    """
+    if not may_fork():
+        yield function
+        return
+
+    def tried() -> tuple[R] | None:
+        try:
+            return (function(),)
+        except BaseException:
+            return None
+
+    child, reading = _begun(tried, None)
+    ended = False
+
+    def result() -> R:
+        nonlocal ended
+        found = pipe.read()
+        status, ended = _status(child), True
+        done: tuple[R] | None = pickle.loads(found) if status == 0 else None
+        return done[0] if done is not None else function()
+
+    with open(reading, "rb") as pipe:
+        try:
+            yield result
+        finally:
+            if not ended:
+                _end(child)
+                _status(child)
+
+
+def _begun(function: Callable[[], Any], limits: Limits | None) -> tuple[int, int]:
+    """The number of a forked process that runs the function, and of the pipe from which its result is read."""
+    reading, writing = os.pipe()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if not child:
+        os.close(reading)
+        _run_apart(function, writing, limits)
+    os.close(writing)
+    return child, reading
+
+
 def _status(child: int) -> int:
     """Exit status of a child that has ended or will; that of a killed one where it was already waited for."""
     try:
@@ -118,15 +161,16 @@ def _status(child: int) -> int:
         return -signal.SIGKILL
 
 
-def _run_apart(function: Callable[[], Any], writing: int, limits: Limits) -> None:
+def _run_apart(function: Callable[[], Any], writing: int, limits: Limits | None) -> None:
     """In the child: the function, its result into the pipe, and the end of the process."""
     status = 70
     try:
         with suppress(ImportError, ValueError, OSError):
             import resource
 
-            most = int((limits.gigabytes + ADDRESSES + 0.25 * (os.cpu_count() or 1)) * 1e9)
-            resource.setrlimit(resource.RLIMIT_AS, (most, most))
+            if limits is not None:
+                most = int((limits.gigabytes + ADDRESSES + 0.25 * (os.cpu_count() or 1)) * 1e9)
+                resource.setrlimit(resource.RLIMIT_AS, (most, most))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         with suppress(AttributeError, OSError):  # Linux: asked to end when the process that watches is gone
             import ctypes

@@ -40,6 +40,7 @@ from tribo.cli.study_options import (
     with_reading_options,
 )
 from tribo.errors import FitError, SimulationError, TriboError, unexpected
+from tribo.forked import beside
 from tribo.own_folder import KEPT, check_folder
 
 if TYPE_CHECKING:
@@ -261,51 +262,63 @@ def demo(console: Console, out: Path, **options: Any) -> int:
     from tribo.report.without_study import SECOND, write_demo_page
     from tribo.wording.card import card_text
 
-    cards: list[Card] = []
+    first, second = (data_dir() / name for name in ("example", "second_example"))
 
-    def conclude(console: Console, study: Study, folder: Path, verdict: Verdict | None, card: Card | None) -> int:
+    def reported(console: Console, campaign: Path, folder: Path) -> tuple[int, Card]:
+        study, _, card = _written(console, campaign, folder, "report", **options)
         assert card is not None
-        cards.append(card)
-        return console.status_after(study.ingested.set_aside)
+        return console.status_after(study.ingested.set_aside), card
 
-    folders = {out: data_dir() / "example", out / SECOND: data_dir() / "second_example"}
-    statuses = [
-        _run_stages(console, campaign, folder, "report", False, conclude=conclude, **options)
-        for folder, campaign in folders.items()
-    ]
+    def second_reported() -> tuple[int, Card]:
+        quiet = replace(console, verbosity=min(console.verbosity, -1))
+        with quiet.taken(out / SECOND, second):
+            return reported(quiet, second, out / SECOND)
+
+    with console.taken(out, first), beside(second_reported) as second_result:
+        console.say(f"the report on the second example, {out / SECOND}, is written at the same time")
+        both = {out: reported(console, first, out), out / SECOND: second_result()}
     page = write_demo_page(out)
-    reports = {folder / "report.html": card for folder, card in zip(folders, cards, strict=True)}
+    reports = {folder / "report.html": card for folder, (_, card) in both.items()}
     record = {"out": str(out), "page": str(page), "cards": {str(r): card.as_dict() for r, card in reports.items()}}
     console.result(record, "\n\n".join(f"{path}\n{card_text(card)}" for path, card in reports.items()))
     console.say(f"open {page}")
-    return max(statuses)
+    return max(status for status, _ in both.values())
 
 
-def _run_stages(
-    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str,
-    conclude: Callable[[Console, Study, Path, Verdict | None, Card | None], int] | None = None, **options: Any,
-) -> int:  # fmt: skip
-    """Run the stages up to ``until`` on one campaign, write their results and tell of them: by ``conclude``, or all."""
+def _run_stages(console: Console, path: Path, out: Path, until: Until, dry_run: bool, **options: Any) -> int:
+    """Run the stages up to ``until`` on one campaign, write their results and tell of them."""
+    if dry_run:
+        from tribo.stages import StudyOptions
+
+        columns, stated = options.pop("columns"), options.pop("stated")
+        chosen = StudyOptions(kept=out / KEPT, **options)
+        return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
+    with console.taken(out, path):
+        study, verdict, card = _written(console, path, out, until, **options)
+    return _conclude(console, study, out, verdict, card)
+
+
+def _written(
+    console: Console, path: Path, out: Path, until: Until, columns: str, stated: Any, **options: Any
+) -> tuple[Study, Verdict | None, Card | None]:
+    """The stages up to ``until`` on one campaign, their results written into a folder that is held."""
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
     from tribo.report.write import Drawing
 
-    stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out / KEPT, **options)
-    if dry_run:
-        return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
-    with console.taken(out, path), open_campaign(path) as described, console.progress() as progress:
+    with open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
-        drawing = Drawing(progress, chosen.jobs, chosen.kept)
         verdict, card = found.verdict if found else None, None
         if until == "report":
             from tribo.wording.card import card_of
 
             card = card_of(study, verdict)
+        drawing = Drawing(progress, chosen.jobs, chosen.kept)
         write_until(study, out, until, drawing, provenance_of_run(study, path, chosen), found, card)
-    return (conclude or _conclude)(console, study, out, verdict, card)
+    return study, verdict, card
 
 
 def _diagnosed(
