@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -262,21 +263,33 @@ def demo(console: Console, out: Path, **options: Any) -> int:
     from tribo.report.without_study import SECOND, write_demo_page
     from tribo.wording.card import card_text
 
-    first, second = (data_dir() / name for name in ("example", "second_example"))
+    def reported(
+        name: str, folder: Path, console: Console, meanwhile: AbstractContextManager[None] | None = None
+    ) -> tuple[int, Card]:
+        cards: list[Card] = []
 
-    def reported(console: Console, campaign: Path, folder: Path) -> tuple[int, Card]:
-        study, _, card = _written(console, campaign, folder, "report", **options)
-        assert card is not None
-        return console.status_after(study.ingested.set_aside), card
+        def conclude(console: Console, study: Study, folder: Path, verdict: Verdict | None, card: Card | None) -> int:
+            assert card is not None
+            cards.append(card)
+            return console.status_after(study.ingested.set_aside)
 
-    def second_reported() -> tuple[int, Card]:
+        status = _run_stages(
+            console, data_dir() / name, folder, "report", False, conclude=conclude, meanwhile=meanwhile, **options
+        )
+        return status, cards[0]
+
+    seconds: list[tuple[int, Card]] = []
+
+    @contextmanager
+    def second_beside() -> Iterator[None]:
         quiet = replace(console, verbosity=min(console.verbosity, -1))
-        with quiet.taken(out / SECOND, second):
-            return reported(quiet, second, out / SECOND)
+        with beside(lambda: reported("second_example", out / SECOND, quiet)) as result:
+            console.say(f"the report on the second example, {out / SECOND}, is written at the same time")
+            yield
+            seconds.append(result())
 
-    with console.taken(out, first), beside(second_reported) as second_result:
-        console.say(f"the report on the second example, {out / SECOND}, is written at the same time")
-        both = {out: reported(console, first, out), out / SECOND: second_result()}
+    both = {out: reported("example", out, console, second_beside())}
+    both[out / SECOND] = seconds[0]
     page = write_demo_page(out)
     reports = {folder / "report.html": card for folder, (_, card) in both.items()}
     record = {"out": str(out), "page": str(page), "cards": {str(r): card.as_dict() for r, card in reports.items()}}
@@ -285,40 +298,38 @@ def demo(console: Console, out: Path, **options: Any) -> int:
     return max(status for status, _ in both.values())
 
 
-def _run_stages(console: Console, path: Path, out: Path, until: Until, dry_run: bool, **options: Any) -> int:
-    """Run the stages up to ``until`` on one campaign, write their results and tell of them."""
-    if dry_run:
-        from tribo.stages import StudyOptions
+def _run_stages(
+    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str,
+    conclude: Callable[[Console, Study, Path, Verdict | None, Card | None], int] | None = None,
+    meanwhile: AbstractContextManager[None] | None = None, **options: Any,
+) -> int:  # fmt: skip
+    """Run the stages up to ``until`` on one campaign, write their results and tell of them: by ``conclude``, or all.
 
-        columns, stated = options.pop("columns"), options.pop("stated")
-        chosen = StudyOptions(kept=out / KEPT, **options)
-        return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
-    with console.taken(out, path):
-        study, verdict, card = _written(console, path, out, until, **options)
-    return _conclude(console, study, out, verdict, card)
-
-
-def _written(
-    console: Console, path: Path, out: Path, until: Until, columns: str, stated: Any, **options: Any
-) -> tuple[Study, Verdict | None, Card | None]:
-    """The stages up to ``until`` on one campaign, their results written into a folder that is held."""
+    ``meanwhile`` begins when the folder is held, and ends when all is written.
+    """
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
     from tribo.report.write import Drawing
 
+    stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out / KEPT, **options)
-    with open_campaign(path) as described, console.progress() as progress:
+    if dry_run:
+        return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
+    with (
+        console.taken(out, path), meanwhile or nullcontext(), open_campaign(path) as described,
+        console.progress() as progress,
+    ):  # fmt: skip
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
+        drawing = Drawing(progress, chosen.jobs, chosen.kept)
         verdict, card = found.verdict if found else None, None
         if until == "report":
             from tribo.wording.card import card_of
 
             card = card_of(study, verdict)
-        drawing = Drawing(progress, chosen.jobs, chosen.kept)
         write_until(study, out, until, drawing, provenance_of_run(study, path, chosen), found, card)
-    return study, verdict, card
+    return (conclude or _conclude)(console, study, out, verdict, card)
 
 
 def _diagnosed(
