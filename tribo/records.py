@@ -6,6 +6,7 @@ all can be imported from here.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -711,6 +712,12 @@ class Campaign:
     def area_fraction(self, sample: str) -> float:
         """Contact area fraction of a sample."""
         return self.samples[sample].area_fraction
+
+    def judged_load_N(self, pressure_Pa: float = 10e3) -> float:
+        """The load of a pressure where it lies among the loads of the tests, else the middle of these."""
+        loads = [test.normal_load_N for test in self.tests if math.isfinite(test.normal_load_N)]
+        usual = pressure_Pa * self.area_m2 if self.has_area else math.nan
+        return usual if loads and min(loads) <= usual <= max(loads) else float(np.median(loads or [math.nan]))
 
     def nominal_pressure_Pa(self, normal_load_N: float) -> float:
         """p = N / A with A the nominal area."""

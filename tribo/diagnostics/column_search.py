@@ -18,6 +18,7 @@ from scipy.stats import f as f_distribution, t as t_distribution
 from tribo.diagnostics.contrasts import share_beyond
 from tribo.diagnostics.gaps import enough_recorded
 from tribo.diagnostics.verdict import RepeatScatter
+from tribo.fitting.alternatives import is_one_level
 from tribo.mechanisms.conditions import is_level
 from tribo.mechanisms.record import StringArray
 from tribo.records import REGIMES, FloatArray, Ingested, Pull, Regime, Test
@@ -195,7 +196,9 @@ def _beyond(law: FloatArray, columns: FloatArray) -> float:
 
 
 def _columns(tests: list[Test], pulls: list[Pull]) -> Iterator[Regressor]:
-    yield from _of_numbers("speed_mm_s", np.array([1e3 * t.speed_m_s if t.speed_m_s else np.nan for t in tests]))
+    speed = np.array([1e3 * t.speed_m_s if t.speed_m_s else np.nan for t in tests])
+    if not is_one_level(speed):
+        yield from _of_numbers("speed_mm_s", speed)
     for name in NUMBERS:
         values = np.array([np.nan if (v := getattr(t, name)) is None else float(v) for t in tests])
         yield from _of_numbers(name, values)

@@ -250,6 +250,8 @@ def stroke_offset(ingested: Ingested) -> Layer | None:
     if len(zeros) < _FEWEST or not backward:
         return None
     mean, se = float(zeros.mean()), max(float(zeros.std(ddof=1) / np.sqrt(len(zeros))), 1e-12)
+    if np.ptp(zeros) <= 1e-9 * abs(mean):  # strokes of one record share their zero
+        se = float(np.median([p.zero_u_N for p in forward]))
     if abs(mean) <= CERTAIN * se:
         return None
     half = float(t_distribution.ppf(0.95, len(zeros) - 1)) * se

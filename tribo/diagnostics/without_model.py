@@ -37,7 +37,7 @@ ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
 RUNNING_IN = SHOWN_BY[ALONG_RECORDS]
 MECHANISMS_OF_COLUMNS = {k: name for k, name in SHOWN_BY.items() if k not in (ALONG_RECORDS, STROKES_APART)}
 Shown = tuple[list[Layer], list[Cause], list[Misfit]]
-SERIES = ("run_order", "specimen_run", "started_at", "date")  # columns that no one can vary
+SERIES = ("run_order", "specimen_run", "started_at", "date", "cycle")  # columns that no one can vary
 
 
 def law_layers(study: Study) -> list[Layer]:
@@ -159,7 +159,7 @@ def _tested(study: Study, tests: list[RegimeTests], enough: list[RegimeTests]) -
     n, loads, samples = max(
         ((t.n, len(np.unique(load_levels(t.load_N))), len(np.unique(t.sample))) for t in tests), default=(0, 0, 0)
     )
-    return ColumnsTested((), TooLittle(n, loads, samples, needed, 1, 1, most_scattered(study.ingested)), same, copied)
+    return ColumnsTested((), TooLittle(n, loads, samples, needed, 1, 1, most_scattered(study.ingested)), (), copied)
 
 
 def copied_readings(ingested: Ingested) -> tuple[tuple[str, ...], ...]:
@@ -221,9 +221,10 @@ def _of_records(records: Sequence[RunningIn]) -> Shown:
 
 
 def _middle(records: Sequence[RunningIn]) -> Estimate:
-    """The median over records, and their range."""
+    """The median over records, and their range; of one record no range."""
     changes = [r.first_percent for r in records]
-    return Estimate(float(np.median(changes)), min(changes), max(changes), "%")
+    ends = (min(changes), max(changes)) if len(changes) > 1 else (math.nan, math.nan)
+    return Estimate(float(np.median(changes)), *ends, "%")
 
 
 def _inseparable(study: Study, enough: list[RegimeTests]) -> list[Excluded]:
@@ -266,8 +267,8 @@ def _next_test(enough: list[RegimeTests], effects: Sequence[ColumnEffect]) -> Ne
     if columns := _only_with_load(enough):
         design = {"loads": 4, "repeats": 3, "order": "random", "pulls": 12, "hours": 1.4}
         return NextTest("part from load", (*columns, "normal_load_N"), design)
-    tied = next((f for f in effects if f.same or f.alike), None)
-    if tied is None:
+    tied = next((f for f in effects if {*f.same} - {*SERIES} or f.alike or (f.same and f.name not in SERIES)), None)
+    if tied is None:  # nobody can part the places of a series from their numbers
         return None
     design = {"covariate": tied.name, "pulls": 12, "hours": 1.4}
     return NextTest("part columns", (tied.name, *tied.same, *tied.alike), design)

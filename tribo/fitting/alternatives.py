@@ -384,6 +384,7 @@ DEPENDENCE_COLUMNS = ["sample", "regime", "variable", "label", "n", "low", "high
                       "change_u_percent", "rank", "p", "p_adjusted", "inseparable_from"]  # fmt: skip
 NOMINAL_LOAD = "nominal_load_N"  # the load by another name, beside the one that was recorded
 SAME_COLUMN = 0.95  # rank correlation of two variables from which on their effects cannot be separated
+ONE_SPEED = 1.05  # largest over smallest speed up to which tests were made at one
 _FEWEST = 5
 _FEWEST_VALUES = 2
 
@@ -426,7 +427,14 @@ def variables_of(points: pd.DataFrame) -> list[str]:
     return [
         name for name in (*VARIABLES, *(c for c in points.columns if c not in VARIABLES and c not in said))
         if name in points.columns and points[name].nunique() >= _FEWEST_VALUES
+        and not (name == SPEED and is_one_level(points[name].to_numpy(float)))
     ]  # fmt: skip
+
+
+def is_one_level(speeds: FloatArray) -> bool:
+    """Whether recorded speeds are those of one drive that was set once: a tachometer is no better than that."""
+    known = speeds[np.isfinite(speeds) & (speeds > 0)]
+    return bool(known.size and known.max() <= ONE_SPEED * known.min())
 
 
 def dependence(ingested: Ingested) -> pd.DataFrame:

@@ -38,9 +38,9 @@ DEFAULTS: dict[str, tuple[float, str]] = {  # used where campaign.toml gives non
     "load_cell_u_N": (0.0, "the zero is measured before each contact"),
     "mass_u_g": (0.03, "balance with a resolution of 0.1 g, rectangular distribution"),
     "normal_load_u_percent": (0.0, "dead weights"),
-    "area_u_percent": (1.0, "sides of about 7 mm, each measured by caliper to 0.05 mm"),
+    "area_u_percent": (1.0, "as for sides of about 7 mm measured by caliper to 0.05 mm; state another"),
     "wire_angle_deg": (0.0, "wire assumed to be horizontal"),
-    "wire_angle_u_deg": (0.5, "wire levelled by eye"),
+    "wire_angle_u_deg": (0.5, "as for a wire levelled by eye; state 0 where no wire pulls"),
 }
 
 
@@ -68,12 +68,11 @@ def campaign_budgets(
     """:func:`uncertainty_budget` of all ``fits`` that hold values, rise and sampling rate from pulls and traces.
 
     The covariance of specimens is partly pooled over the samples first. T is judged at ``load_N``; where that is not
-    given, at a pressure of 10 kPa, or without a nominal area at the middle load of the campaign.
+    given, at a pressure of 10 kPa if it was measured there, else at the middle load of the campaign.
     """
     table, campaign = ingested.table(), ingested.campaign
     if load_N is None:
-        middle = float(np.median([test.normal_load_N for test in campaign.tests]))
-        load_N = PRESSURE_PA * campaign.area_m2 if campaign.has_area else middle
+        load_N = campaign.judged_load_N(PRESSURE_PA)
     usable = tuple(fit.by_itself for fit in fits if np.isfinite(fit.by_itself.covariance).all())
     rate = [1 / float(np.median(np.diff(t.time_s))) for t in ingested.traces.values() if len(t.time_s) > 1]
     stated = campaign.instrument.get("sampling_rate_Hz", float(np.median(rate)) if rate else float("nan"))

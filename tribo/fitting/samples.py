@@ -48,7 +48,7 @@ def fit_regimes(table: pd.DataFrame, nominal_area_m2: float | None, *, weights: 
                 raise
             problems += why.problems  # a log of steps while sliding has no static peaks, and a law all the same
     if not found:
-        raise FitError(problems)
+        raise FitError(list(dict.fromkeys(problems)))
     return tuple(found)
 
 

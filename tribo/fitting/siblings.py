@@ -23,6 +23,7 @@ LEAST_RATIO = 1.15  # less is not a slip, whatever the scatter
 SPLIT = 5.0  # ratio between equal pulls that no scatter of repeats or specimens gives, and a wrong unit exceeds
 FEWEST_SPLIT, LEAST_SPLIT = 3, 0.25  # cells, and the share of all, that a slip of many exports splits
 LOADS_APART = 0.1  # by which two loads differ, as ln, at the least: the line of loads that are alike leads anywhere
+FEWEST_LEVELS = 3  # of load, beyond which a power is told from a line
 MOST_NAMED = 3
 FEWEST_COPIED, COPIED_SHARE, COPIED_DIGITS = 3, 0.25, 3  # pairs of forces with so many digits, equal by chance hardly
 FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
@@ -160,22 +161,30 @@ def _far(pulls: Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, 
 
 
 def _beside_law(pulls: Pulls, log_force: FloatArray) -> FloatArray:
-    """ln T less that of a straight line T = mu N + T0 of its sample, by repeated medians (Siegel 1982), shape (n,)."""
+    """ln T less that of the law of its sample, shape (n,): T = mu N + T0, or T = a N^b where that leaves less."""
     left = np.empty_like(log_force)
     for sample in np.unique(pulls["sample"]):
         rows = np.flatnonzero(pulls["sample"] == sample)
-        x, ratio = 1.0 / pulls["load_N"][rows], np.exp(log_force[rows]) / pulls["load_N"][rows]
-        apart = x[:, None] - x[None, :]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slopes = np.where(
-                np.abs(np.log(x[:, None] / x[None, :])) > LOADS_APART, (ratio[:, None] - ratio[None, :]) / apart, np.nan
-            )
-        known = np.isfinite(slopes).any(axis=1)
-        slope = float(np.median(np.nanmedian(slopes[known], axis=1))) if known.any() else 0.0
-        line = slope * x + np.median(ratio - slope * x)
-        level = np.log(line * pulls["load_N"][rows]) if (line > 0).all() else np.median(log_force[rows])
-        left[rows] = log_force[rows] - level
+        load, own = pulls["load_N"][rows], log_force[rows]
+        line = _median_line(1.0 / load, np.exp(own) / load, load) * load
+        left[rows] = own - (np.log(line) if (line > 0).all() else np.median(own))
+        if np.ptp(np.log(load)) > 2.0 * LOADS_APART and len(np.unique(pulls["level"][rows])) > FEWEST_LEVELS:
+            power = own - _median_line(np.log(load), own, load)
+            left[rows] = min(left[rows], power, key=lambda off: float(np.abs(off).sum()))
     return left
+
+
+def _median_line(x: FloatArray, y: FloatArray, load_N: FloatArray) -> FloatArray:
+    """The values of a straight line through (x, y) by repeated medians (Siegel 1982), of loads that are apart."""
+    log_load = np.log(load_N)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = np.where(
+            np.abs(log_load[:, None] - log_load[None, :]) > LOADS_APART,
+            (y[:, None] - y[None, :]) / (x[:, None] - x[None, :]), np.nan,
+        )  # fmt: skip
+    known = np.isfinite(slopes).any(axis=1)
+    slope = float(np.median(np.nanmedian(slopes[known], axis=1))) if known.any() else 0.0
+    return np.asarray(slope * x + np.median(y - slope * x))
 
 
 def _from_siblings(pulls: Pulls, values: FloatArray) -> FloatArray:

@@ -361,10 +361,15 @@ def _chosen(
 
 
 def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
-    """Which pieces carry a load; all of them where none was recorded."""
+    """Which pieces carry a load for half of their time; all of them where none was recorded."""
     from tribo.traces import load_of
 
-    loads = np.nan_to_num(np.abs([load_of(piece)[0] for piece in pieces]))
+    def carried(piece: Trace) -> float:
+        load = piece.columns.get("normal_force_N")
+        usual = math.inf if load is None else float(np.median(np.abs(load)))
+        return min(usual, abs(load_of(piece)[0]))
+
+    loads = np.nan_to_num([carried(piece) for piece in pieces])
     return [bool(load >= _UNLOADED * loads.max()) for load in loads]
 
 

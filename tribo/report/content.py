@@ -51,7 +51,7 @@ def content(
         "card": card if card is not None else card_of(study, verdict),
         "verdict": verdict_in_words(verdict) if verdict is not None else None,
         "summary": _summary(study),
-        "friction": wording.friction_sentences(study),
+        "friction": wording.friction_sentences(study, verdict),
         "has_area": study.ingested.campaign.has_area,
         "about": about(study.ingested.campaign),
         "table2": _table2(study),
@@ -193,7 +193,10 @@ def budget_tables(study: Study) -> list[dict[str, Any]]:
         return []
     order = findings.sample_numbers(study)
     parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
-    return [_budget_table(regime, part, list(order)) for regime, part in parts if not part.empty]
+    load_N, campaign = study.ingested.campaign.judged_load_N(), study.ingested.campaign
+    at = f"{significant(campaign.nominal_pressure_Pa(load_N) / PA_PER_KPA)} kPa" if campaign.has_area else ""
+    at = at or f"{significant(load_N)} N"
+    return [{"at": at, **_budget_table(regime, part, list(order))} for regime, part in parts if not part.empty]
 
 
 def _budget_table(regime: Regime, part: pd.DataFrame, order: list[str]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from tribo.records import FloatArray, Trace
-from tribo.traces.drive import Mask, at_rest_below, drive_of, level_cuts
+from tribo.traces.drive import Mask, at_rest_below, drive_of, level_cuts, stroke_end
 from tribo.traces.signal import MINIMUM_SAMPLES, median_of_three, running_mean, runs_of, sample_noise, wander
 
 _AT_REST = 0.05  # share of the usual speed below which the drive stands still
@@ -22,6 +22,7 @@ _AT_REST_AS_ROUGH = 0.5  # share of the noise of the other direction below which
 _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
 _CLEARLY_APART = 1.25  # ratio of two speeds that the slope of a displacement tells apart
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
+_BEFORE_DWELL = (0.6, 1.0)  # the same, as shares of its motion, of one that dwells at its end
 
 
 def split_pulls(trace: Trace) -> tuple[Trace, ...]:
@@ -170,7 +171,11 @@ def directions_of(
     """
     middles = []
     for piece in pieces:
-        start, end = (int(share * piece.force_N.size) for share in _MIDDLE)
+        size, stop = piece.force_N.size, stroke_end(piece)
+        if stop is not None and stop < size:  # it dwells: the force has come to its level late in the motion
+            start, end = (int(share * stop) for share in _BEFORE_DWELL)
+        else:
+            start, end = (int(share * size) for share in _MIDDLE)
         middles.append(piece.force_N[start : max(end, start + 1)])
     forces = np.array([float(f.mean()) for f in middles]) - np.array(zeros_N)
     if not forces.min() < 0 < forces.max():

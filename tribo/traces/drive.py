@@ -49,6 +49,8 @@ _STEP = 0.08  # share of the lower level by which two levels of speed or load di
 _OF_NOISE = 6.0  # and this many times the noise of the difference
 _QUARTER = 0.25  # share of the way between two levels at which a passage is placed
 _SHORTEST = 0.02  # share of a motion that a level lasts at the least
+_SETS_OUT = 0.1  # share of the longest motion of a piece below which another one only sets out on the next stroke
+_KEPT = 0.9  # share of the load of a stroke that a second motion carries if it belongs to it
 
 
 @dataclass(frozen=True)
@@ -228,6 +230,26 @@ def drive_stops(moving: Mask, contact: Range) -> tuple[list[Range], int, list[Ra
     stops = [(a, b) for a, b in rests if max(first, contact[0]) < a and b < min(last, contact[1])]
     after = moving.size - last - 1
     return stops, min(contact[1], last + 1) if after >= FEWEST_AT_REST else contact[1], rests
+
+
+def stroke_end(piece: Trace) -> int | None:
+    """The sample at which the drive of one stroke stops; the size where it does not, None where no channel tells.
+
+    What moves the other way after it, or hardly, is the next stroke; what moves unloaded is the way to the end.
+    """
+    drive, samples = drive_of(piece), piece.time_s.size
+    if drive is None or not drive.moving.any():
+        return None
+    starts, ends = runs_of(drive.moving)
+    ways = [float(drive.pace[a:b].sum()) for a, b in zip(starts, ends, strict=True)]
+    load = piece.columns.get("normal_force_N")
+    loads = [1.0 if load is None else abs(float(np.median(load[a:b]))) for a, b in zip(starts, ends, strict=True)]
+    last = int(np.argmax(np.abs(ways)))
+    for k in range(last + 1, ends.size):
+        on = ways[k] * ways[last] > 0 and ends[k] - starts[k] >= _SETS_OUT * (ends - starts).max()
+        last = k if on and loads[k] >= _KEPT * loads[last] else last
+    end = int(ends[last])
+    return end if samples - end >= FEWEST_AT_REST else samples
 
 
 def quiet_end(force_N: FloatArray) -> int:

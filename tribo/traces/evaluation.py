@@ -51,6 +51,7 @@ _LEFT_OUT = 0.1  # share at the start of a record that slides from its first sam
 _FEWEST = 20
 _FEWEST_BY_HAND = 10
 _WITH_LOAD = 0.6  # correlation of force and load from which on the force follows the load
+_AS_LOAD = 0.25  # share of the relative change of the force that the load changes by at the least, if that follows it
 _SETTLED = 0.05  # share of its mean by which a force may change while it slides and still count as settled
 _LEAD_IN = 0.75  # share of a stop after which the piece that holds its restart begins
 _GAP = 3.0
@@ -175,7 +176,7 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
             pull = _over(pull, signal, *options.window_s)
         if zero is None or zero.rule == BEFORE_CONTACT:
             pull = _with_doubt_of_zero(pull, signal, course)
-        window = course.contact
+        window = course.contact[0], min(course.contact[1], max(course.end, course.contact[0] + 1))
         if not options.begins and math.isfinite(pull.window_s[0]):
             first, last = np.searchsorted(trace.time_s, pull.window_s)
             window = int(first), int(last)
@@ -616,7 +617,8 @@ def _with_oscillation(pull: Pull, trace: Trace, signal: Signal, test: Test) -> P
     load = trace.columns.get("normal_force_N")
     if load is not None and found.cycles:
         load = load[first : last + 1]
-        varies = np.isfinite(load).all() and np.ptp(load) > 0 and np.ptp(force) > 0
+        varies = np.isfinite(load).all() and np.ptp(force) > 0
+        varies = varies and np.std(load) * abs(np.mean(force)) > _AS_LOAD * np.std(force) * abs(np.mean(load))
         if varies and abs(float(np.corrcoef(force, load)[0, 1])) > _WITH_LOAD:  # as on a disc that runs out of true
             return replace(pull, oscillation=replace(found, regime="steady"), flags=(*pull.flags, "follows_load"))
     if math.isfinite(pull.static_N) or found.regime in ("steady", "irregular"):

@@ -29,6 +29,7 @@ from tribo.traces.drive import (
     quiet_end,
     relaxes_from,
     standstills,
+    stroke_end,
 )
 from tribo.traces.loading import loading_of, starting_level
 from tribo.traces.signal import (
@@ -160,14 +161,8 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
 
 def course_of_piece(trace: Trace, signal: Signal, *, starts_sliding: bool) -> Course:
     """The course of a piece that was cut from a record: it ends where its drive stops."""
-    whole, drive = (0, signal.time_s.size), drive_of(trace)
-    if drive is not None and drive.moving.any():
-        starts, ends = runs_of(drive.moving)
-        if ends.size > 1 and ends[-1] - starts[-1] < _WAITS * (ends - starts).max():  # it sets out on the next stroke
-            ends = ends[:-1]
-        end = int(ends[-1])
-        end = end if whole[1] - end >= FEWEST_AT_REST else whole[1]
-    else:
+    whole, end = (0, signal.time_s.size), stroke_end(trace)
+    if end is None:
         held = _before_it_turns(signal.calm_N)
         end = stands_from(signal.force_N[:held])
         end = max(end - int(_LATE * held), 1) if end < held else whole[1]

@@ -66,7 +66,7 @@ def name_in_words(name: str) -> str:
 def meaning_in_words(name: str, shows: object = None) -> str:
     """What a mechanism that a verdict names means, as a clause; ``shows`` is what showed it."""
     if isinstance(shows, tuple) and shows and isinstance(shows[0], RunningIn):
-        return "within one record, friction changes with the distance before it is steady"
+        return "within one record, friction changes with the distance"
     _, _, column = name.partition(":")
     return f"friction follows {in_words(column)}, which no other mechanism uses" if column else mechanism(name).meaning
 
@@ -280,17 +280,18 @@ def _running_in(records: Sequence[RunningIn]) -> str:
     more = f" and {len(records) - MOST_RECORDS} more" if len(records) > MOST_RECORDS else ""
     share = 100.0 * records[0].distance_m / records[0].whole_m
     return (
-        f"Running-in: over the first {share:.0f} % of the distance, sliding friction differs from that of the second "
-        f"half in {len(records)} record{'s' if len(records) > 1 else ''}: {', '.join(shown)}{more} (adjusted p at most "
+        f"Running-in or drift: over the first {share:.0f} % of the distance, sliding friction differs from that of the "
+        f"second half in {counted(len(records), 'record')}: {', '.join(shown)}{more} (adjusted p at most "
         f"{max(max(r.p for r in records), 0.001):.2g})."
     )
 
 
 def _offset(layer: Layer) -> str:
     (forward, backward), offset = layer.shows, layer.parameters["F0"]
+    value, low, high = (f"{x:.3g}".replace("-", "−") for x in (offset.value, offset.low, offset.high))
     return (
-        f"The force recorded in {forward} forward and {backward} backward strokes is offset by {offset.value:.3g} N "
-        f"(90 % interval {offset.low:.3g} to {offset.high:.3g} N), {abs(layer.effect_percent):.0f} % "
+        f"The force recorded in {forward} forward and {backward} backward strokes is offset by {value} N "
+        f"(90 % interval {low} to {high} N), {abs(layer.effect_percent):.0f} % "
         "of the sliding force: the directions differ by twice that. The offset was subtracted as the zero of each pair."
     )
 

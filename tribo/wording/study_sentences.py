@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tribo.comparison import findings
 from tribo.comparison.findings import Agreement, Ranking, Verdict, all_set_aside, shown
+from tribo.diagnostics.column_search import ColumnEffect
+from tribo.diagnostics.verdict import Verdict as Found
+from tribo.diagnostics.without_model import SERIES
 from tribo.records import PA_PER_KPA, REGIMES, Campaign, LawFit, Override, Pull, Study, Test
 from tribo.vocabulary import label_with_unit
 from tribo.wording.numerals import (
@@ -329,14 +332,18 @@ def friction_sentence(study: Study) -> str:
     return ratio_of_samples(study)
 
 
-def friction_sentences(study: Study) -> dict[str, list[str]]:
-    """Sentences by section; all empty where the study was made with the model."""
+def friction_sentences(study: Study, verdict: Found | None = None) -> dict[str, list[str]]:
+    """Sentences by section; all empty where the study was made with the model.
+
+    The size of a dependence that the ``verdict`` states is not told a second time by another measure.
+    """
+    said = {(f.regime, f.name) for m in (verdict.misfits if verdict else ()) for f in _effects(m.shows)}
     if not shown(study):
         return {"samples": [], "laws": [], "dependence": [], "oscillation": []}
     return {
         "samples": list(_samples(study)),
         "laws": list(_chosen_laws(study)),
-        "dependence": list(_dependence(study)),
+        "dependence": list(_dependence(study, said)),
         "oscillation": [*_directions(study), *_oscillation(study), *_restarts(study), *_readings(study)],
     }
 
@@ -404,7 +411,11 @@ def _values(law: Mapping[str, Any]) -> str:
     }[law["law"]]  # fmt: skip
 
 
-def _dependence(study: Study) -> Iterator[str]:
+def _effects(shows: object) -> tuple[ColumnEffect, ...]:
+    return tuple(f for f in shows if isinstance(f, ColumnEffect)) if isinstance(shows, tuple) else ()
+
+
+def _dependence(study: Study, said: Collection[tuple[str, str]]) -> Iterator[str]:
     table = study.dependence
     if table is None or table.empty:
         return
@@ -412,9 +423,11 @@ def _dependence(study: Study) -> Iterator[str]:
     if clear.empty:
         yield "T/N varies significantly with no recorded variable (rank correlations, adjusted for their number)."
     for row in _rows(clear.head(MOST_SAID)):
-        change = f"{percent(row['change_percent'] / 100)} from {row['low']:.3g} to {row['high']:.3g}"
+        change = f": {percent(row['change_percent'] / 100)} from {row['low']:.3g} to {row['high']:.3g}"
+        if (row["regime"], row["variable"]) in said or row["change_percent"] * row["rank"] < 0:
+            change = ""  # the diagnosis states it, or a line and the ranks contradict each other
         yield (
-            f"{row['regime'].capitalize()} T/N of {row['sample']} varies with {row['label']}: {change} (rank "
+            f"{row['regime'].capitalize()} T/N of {row['sample']} varies with {row['label']}{change} (rank "
             f"correlation {significant(row['rank'], 2)}, adjusted p {p_text(row['p_adjusted'])}, "
             f"{counted(row['n'], 'test')})."
         )
@@ -429,10 +442,10 @@ def _inseparable(table: pd.DataFrame) -> Iterator[str]:
         for other in row["inseparable_from"]
     ]
     for sample, one, other in list(dict.fromkeys(pairs))[:MOST_SAID]:
-        yield (
-            f"For {sample}, {one} and {other} vary together, so their effects cannot be separated. Next test: repeat "
-            f"several values of {one} in random order of {other}."
-        )
+        said = f"For {sample}, {one} and {other} vary together, so their effects cannot be separated."
+        series = {label_with_unit(name) for name in SERIES}
+        known = {one, other} <= series  # places of a series, which nobody can part
+        yield said if known else f"{said} Next test: repeat several values of {one} in random order of {other}."
 
 
 def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -455,11 +468,12 @@ def _directions(study: Study) -> Iterator[str]:
     if not all(both.values()):
         return
     offsets = np.array([p.zero_N for p in both["forward"]] + [-p.zero_N for p in both["backward"]])
+    apart = f", standard deviation {significant(float(offsets.std()), 2)} N" if np.ptp(offsets) > 1e-9 else ""
     means = {way: float(np.mean([p.sliding_N for p in pulls])) for way, pulls in both.items()}
     yield (
         f"{counted(len(both['forward']), 'stroke')} forward and {len(both['backward'])} backward: the force recorded "
-        f"in the two directions differs by twice {significant(float(offsets.mean()))} N (the zero, standard deviation "
-        f"{significant(float(offsets.std()), 2)} N), which was subtracted. Mean sliding force forward "
+        f"in the two directions differs by twice {significant(float(offsets.mean()))} N (the zero{apart}), "
+        f"which was subtracted. Mean sliding force forward "
         f"{significant(means['forward'])} N, backward {significant(means['backward'])} N."
     )
 
@@ -477,12 +491,12 @@ def _readings(study: Study) -> Iterator[str]:
     if of["cycle"]:
         yield f"{counted(len(of['cycle']), 'cycle')} of strokes were read, each a line of readings.csv."
     for state, said in (
-        ("still drifts", "still drift at their end: the mean of their last part is no steady level"),
-        ("cannot tell", "vary too much to tell whether they have reached a steady level"),
+        ("still drifts", "force still drifts at the end: the mean of the last part is no steady level"),
+        ("cannot tell", "force varies too much to tell whether a steady level was reached"),
     ):
         found = [r.test_id for r in of["running-in"] if r.state == state]
         if found:
-            yield f"{counted(len(found), 'record')} that slide on and on {said}: {', '.join(found)}."
+            yield f"In {counted(len(found), 'record')} of continuous sliding, the {said}: {', '.join(found)}."
 
 
 def _restarts(study: Study) -> Iterator[str]:

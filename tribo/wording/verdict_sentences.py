@@ -372,7 +372,7 @@ def scatter_in_words(scatter: RepeatScatter | None) -> str:
         apart = f"scatters by {significant(100 * (scatter.factor - 1), 2)} %"
     return (
         f"{sentence_case(scatter.regime)} friction of {scatter.sample} at {significant(scatter.normal_load_N)} N, "
-        f"measured {scatter.n} times, {apart}."
+        f"measured {scatter.n} times at one speed and hold, {apart}."
     )
 
 
@@ -411,6 +411,10 @@ def _without_model(v: Verdict) -> Verdict:
         names = "; ".join(dict.fromkeys(name_in_words(c.mechanism) for c in v.causes))
         found = [c.text for c in v.causes]
         sentence, said = found, [f"Found beside the law of each sample: {names}.", *found]
+        if shows.lack is not None:
+            evidence.append(f"What else friction varies with cannot be told: {lacking(shows.lack)}.")
+        if len(laws) <= MOST_LAWS:
+            sentence = [*found, *laws]
     elif shows.lack is not None:
         said = [f"Cannot tell what friction varies with beside the law of each sample: {lacking(shows.lack)}."]
         sentence = [*said, *laws[:1]]

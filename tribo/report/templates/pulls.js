@@ -24,7 +24,7 @@
     const rule = order[byId("sort").value];
     list.append(...[...cards].sort((a, b) => rule(a, b) || byName(a, b)));
     const count = shown().length;
-    byId("pull-count").textContent = `${count} of ${cards.length} pulls`;
+    byId("pull-count").textContent = `${count} of ${cards.length} pull${cards.length === 1 ? "" : "s"}`;
   }
   for (const [, node] of filters) node.addEventListener("change", show);
   byId("sort").addEventListener("change", show);
