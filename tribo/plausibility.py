@@ -541,6 +541,15 @@ def _exports(ingested: Ingested) -> Iterator[Doubt]:
     if other:
         place, slip = f"{_TABLE}, column file", "exports or rows may be exchanged"
         yield Doubt("file", "the test named in the export", _listed([*other.values()]), "that of its row", place, slip)
+    why = {r for t in ingested.traces.values() if t.source is not None for r in t.source.reasons.values()}
+    for key, stated, word, unit in (
+        ("nominal_area_mm2", ingested.campaign.has_area and ingested.campaign.area_m2 == 1e-6, "stress", "mm2"),
+        ("lever_arm_mm", any(t.correction.lever_arm_m == 1e-3 for t in ingested.campaign.tests), "lever arm", "mm"),
+    ):
+        if stated and any(word in reason for reason in why):
+            found, place = f"1 {unit}, which stands where none is known", f"{_TOML}, {key}"
+            slip = "T/N holds; forces, areas and pressures are not those of the specimen"
+            yield Doubt(key, "the " + key.rpartition("_")[0].replace("_", " "), found, "that of the rig", place, slip)
     arms = [t.test_id for t in ingested.campaign.tests if t.correction.lever_arm_m is not None]
     sources = [ingested.traces[name].source for name in arms if name in ingested.traces]
     reasons = [why for source in sources if source is not None for why in source.reasons.values()]

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
+_DISTURBED = 0.03  # share by which load and speed differ at the most, and of a record, where a slide was only disturbed
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 _LABELLED = 0.9  # share of exports that name their own test from which on a header that names another one counts
 _FEWEST = 5
@@ -262,6 +263,7 @@ def _whole(
         return trace
     pieces = split_pulls(trace)
     loaded = [] if len(pieces) == 1 else [k for k, there in enumerate(_carry_load(pieces)) if there]
+    loaded = [k for n, k in enumerate(loaded) if not n or not _goes_on(trace, pieces[loaded[n - 1]], pieces[k])]
     if len(loaded) < 2:
         return trace
     export, choice = split_choice(trace.file)
@@ -360,16 +362,26 @@ def _chosen(
     return found
 
 
+def _goes_on(trace: Trace, before: Trace, piece: Trace) -> bool:
+    """Whether a piece goes on as the one before it did, after a short disturbance of load or speed."""
+    time = trace.time_s
+    if piece.time_s[0] - before.time_s[-1] > _DISTURBED * (time[-1] - time[0]):
+        return False
+    channels = ("normal_force_N", "speed_m_s", "rotation_rev_per_s")
+    pairs = [(np.median(p.columns[c]) for p in (before, piece)) for c in channels if c in trace.columns]
+    pairs += [(np.sign(np.median(p.force_N)) for p in (before, piece))]
+    return bool(pairs) and all(abs(b - a) <= _DISTURBED * abs(a) for a, b in pairs)
+
+
 def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
     """Which pieces carry a load for half of their time; all of them where none was recorded."""
     from tribo.traces import load_of
 
-    def carried(piece: Trace) -> float:
-        load = piece.columns.get("normal_force_N")
-        usual = math.inf if load is None else float(np.median(np.abs(load)))
-        return min(usual, abs(load_of(piece)[0]))
-
-    loads = np.nan_to_num([carried(piece) for piece in pieces])
+    loads = np.nan_to_num([load_of(piece)[0] for piece in pieces])
+    loads *= np.sign(loads[np.argmax(np.abs(loads))])  # a load cell may show less than nothing before contact
+    recorded = [piece.columns.get("normal_force_N") for piece in pieces]
+    usual = [math.inf if load is None else float(np.median(np.abs(load))) for load in recorded]
+    loads = np.minimum(loads, usual)
     return [bool(load >= _UNLOADED * loads.max()) for load in loads]
 
 

@@ -484,19 +484,24 @@ def _readings(study: Study) -> Iterator[str]:
     levels = [r for r in of["plateau"] if r.way]
     if levels:
         ways = [way for way in ("up", "down") if any(r.way == way for r in levels)]
+        said = [
+            f"{significant(r.values['coefficient'][0])} at {significant(r.speed_m_s * 1e3)} mm/s and "
+            f"{significant(r.normal_load_N)} N" for r in levels if "coefficient" in r.values
+        ]  # fmt: skip
+        shown = f": sliding T/N {', '.join(said)}" if 0 < len(said) == len(levels) <= MOST_SAID else ""
         yield (
-            f"{counted(len(levels), 'level')} of speed or load were read on the way {' and '.join(ways)}; readings.csv "
-            "holds the mean of each with its 95 % interval."
+            f"{counted(len(levels), 'level')} of speed or load were read on the way {' and '.join(ways)}{shown}; "
+            "readings.csv holds the mean of each with its 95 % interval."
         )
     if of["cycle"]:
         yield f"{counted(len(of['cycle']), 'cycle')} of strokes were read, each a line of readings.csv."
-    for state, said in (
+    for state, why in (
         ("still drifts", "force still drifts at the end: the mean of the last part is no steady level"),
         ("cannot tell", "force varies too much to tell whether a steady level was reached"),
     ):
         found = [r.test_id for r in of["running-in"] if r.state == state]
         if found:
-            yield f"In {counted(len(found), 'record')} of continuous sliding, the {said}: {', '.join(found)}."
+            yield f"In {counted(len(found), 'record')} of continuous sliding, the {why}: {', '.join(found)}."
 
 
 def _restarts(study: Study) -> Iterator[str]:
