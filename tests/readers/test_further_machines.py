@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +62,42 @@ def test_a_coefficient_of_a_pin_on_disc_without_a_load_asks_for_the_load(tmp_pat
     path = written(tmp_path / "export.txt", head, [TIME, TIME, TIME, 0.1 * FORCE], "\t", False, "utf-8")
     with pytest.raises(ReadError, match=r"normal_load_N in tests\.csv or with --set"):
         read_export(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "form", "separator", "comma"),
+    [
+        ("Date,Time,Friction force (N),Normal force (N)", "%Y-%m-%d,%H:%M:%S.{ms}", ",", False),
+        ("Time,Date,Friction force (N),Normal force (N)", "%H:%M:%S.{ms},%d-%b-%Y", ",", False),
+        ("Datum;Uhrzeit;Reibkraft [N];Normalkraft [N]", "%d.%m.%Y;%H:%M:%S,{ms}", ";", True),
+        ("Date\tTime\tFriction (N)\tLoad (N)", "%m/%d/%Y\t%I:%M:%S.{ms} %p", "\t", False),
+        ("Date,Time,ms,Friction force (N),Normal force (N)", "%Y/%m/%d,%H:%M:%S,{ms}", ",", False),
+        ("Timestamp,Friction force (N),Normal force (N)", "%Y-%m-%dT%H:%M:%S.{ms}Z", ",", False),
+        ("Time,Friction force (N),Normal force (N)", "%H:%M:%S.{ms}", ",", False),
+    ],
+)
+@pytest.mark.parametrize("begins", ["2024-05-07T14:03:22.500", "2024-02-28T23:59:58.900"])
+def test_the_clock_of_a_logger_counts_from_its_first_row(
+    tmp_path: Path, head: str, form: str, separator: str, comma: bool, begins: str
+) -> None:
+    rows = []
+    for t, force, load in zip(TIME, FORCE, LOAD, strict=True):
+        now = datetime.fromisoformat(begins) + timedelta(seconds=float(t))
+        clock = now.strftime(form).replace("{ms}", f"{now.microsecond // 1000:03d}")
+        numbers = f"{force:.5f}{separator}{load:.5f}"
+        rows.append(clock + separator + (numbers.replace(".", ",") if comma else numbers))
+    path = tmp_path / "export.csv"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    trace = read_export(path)
+    assert trace.time_s == pytest.approx(TIME, abs=1e-3)
+    assert trace.force_N == pytest.approx(FORCE, abs=1e-4)
+    assert trace.columns["normal_force_N"] == pytest.approx(LOAD, abs=1e-4)
+
+
+def test_elapsed_seconds_go_before_a_clock_of_whole_seconds(tmp_path: Path) -> None:
+    start = datetime.fromisoformat("2024-05-07T14:03:22")
+    clock = [f"{start + timedelta(seconds=int(t + 0.33)):%Y-%m-%d,%H:%M:%S}" for t in TIME]
+    rows = [f"{now},{t:.2f},{force:.5f}" for now, t, force in zip(clock, TIME, FORCE, strict=True)]
+    path = tmp_path / "export.csv"
+    path.write_text("\n".join(["Date,Time,Elapsed (s),Friction force (N)", *rows]) + "\n")
+    assert read_export(path).time_s == pytest.approx(TIME, abs=1e-6)

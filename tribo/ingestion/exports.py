@@ -368,8 +368,9 @@ def _goes_on(trace: Trace, before: Trace, piece: Trace) -> bool:
     if piece.time_s[0] - before.time_s[-1] > _DISTURBED * (time[-1] - time[0]):
         return False
     channels = ("normal_force_N", "speed_m_s", "rotation_rev_per_s")
-    pairs = [(np.median(p.columns[c]) for p in (before, piece)) for c in channels if c in trace.columns]
-    pairs += [(np.sign(np.median(p.force_N)) for p in (before, piece))]
+    values = [[p.columns[c] for p in (before, piece)] for c in channels if c in trace.columns]
+    pairs = [tuple(map(np.median, two)) for two in values]
+    pairs += [(np.sign(np.median(before.force_N)), np.sign(np.median(piece.force_N)))]
     return bool(pairs) and all(abs(b - a) <= _DISTURBED * abs(a) for a, b in pairs)
 
 

@@ -22,6 +22,7 @@ from tribo.readers.checks import (
     complete,
     spread_over_ticks,
 )
+from tribo.readers.clocks import by_the_clock
 from tribo.readers.columns import (
     ACCEPTABLE,
     ROWS_LEFT_OUT,
@@ -240,6 +241,12 @@ def read_tables(
             continue
         outcomes = [read_table(machine, *part) for part in parts or [(source, layout, given)]]
         end: Sequence[str] = ()
+        if not parts and _lacks_time(outcomes[0]) and (timed := by_the_clock(source, layout, given)) is not None:
+            source, stated = timed
+            try:
+                outcomes = [read_table(machine, source, first_table(source, stated), stated)]
+            except ReadError as why:
+                outcomes = [why]
         if not parts and isinstance(outcomes[0], ReadError) and not source.arrays:
             tables, end = tables_one_below_the_other(source, layout, given)
             if len(tables) > 1 or tables[0].end != layout.end:
@@ -256,6 +263,13 @@ def read_tables(
     if problems or not readings:
         raise ReadError(problems or refused)
     return readings, others, footer
+
+
+def _lacks_time(outcome: ReadTable | ReadError) -> bool:
+    """Whether a table has no time, or a time of day where seconds are wanted."""
+    if isinstance(outcome, ReadTable):
+        return any(p.kind == NO_TIME for p in outcome.findings)
+    return any(p.kind == "time_of_day" or "recognised as the time" in p.what for p in outcome.problems)
 
 
 def _sorted_out(
