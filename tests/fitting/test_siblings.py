@@ -99,3 +99,22 @@ def test_forces_of_one_sample_copied_from_another_are_named(ingested: Ingested) 
     (copied,) = [d for d in doubts if "digit by digit" in d.found]
     assert copied.name == "friction of sample A"
     assert "12 of 12 pairs of forces are those of sample B" in copied.found
+
+
+def test_forces_that_follow_a_power_of_the_load_are_no_slips(ingested: Ingested) -> None:
+    """A straight line misses the ends of T = N^0.3 by more than a fifth."""
+    rng = np.random.default_rng(4)
+    loads = np.repeat(np.geomspace(0.5, 16.0, 6), 2)
+    tests = tuple(
+        replace(t, sample="S", specimen="S", normal_load_N=float(n))
+        for t, n in zip(ingested.campaign.tests, loads, strict=False)
+    )
+    forces = loads**0.3 * np.exp(0.02 * rng.standard_normal(loads.size))
+    pulls = {
+        t.test_id: replace(ingested.pulls[t.test_id], static_N=float("nan"), sliding_N=float(f))
+        for t, f in zip(tests, forces, strict=True)
+    }
+    powers = replace(ingested, campaign=replace(ingested.campaign, tests=tests), pulls=pulls)
+    assert sibling_doubts(powers) == ()
+    (doubt,) = sibling_doubts(times(powers, {tests[-1].test_id: 0.5}))
+    assert f"test {tests[-1].test_id} " in doubt.name

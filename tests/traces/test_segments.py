@@ -10,7 +10,7 @@ import pytest
 
 from tribo.errors import TraceError
 from tribo.records import Trace
-from tribo.traces import load_of, pieces_of, read_pulls, split_pulls
+from tribo.traces import evaluate, load_of, pieces_of, read_pulls, split_pulls
 from tribo.traces.cuts import reversals, steps
 from tribo.traces.evaluation import _slides_on as slides_on
 
@@ -184,3 +184,41 @@ def test_a_piece_after_a_step_slides_on_unless_its_force_has_fallen_or_its_drive
     speed = np.where(np.arange(400) < 60, drive, 1.0)
     piece = Trace("piece", np.arange(400) / RATE, force, columns={"speed_m_s": 1e-3 * speed})
     assert slides_on(piece) == slides
+
+
+def with_dwells(strokes: int = 12, offset_N: float = 0.1, unloads: bool = True) -> tuple[Trace, np.ndarray]:
+    """A drive that goes 1 mm in 1 s and dwells as long; 0.3 mm stretch the rig before 2 N of friction are reached.
+
+    While it dwells the force creeps by a tenth, other than while it slides. At the end the load is taken off.
+    """
+    step, rng = 0.01, np.random.default_rng(7)
+    way = np.concatenate([np.linspace(0.0, 1.0, 100, endpoint=False), np.ones(100)])
+    position = np.concatenate([way if k % 2 == 0 else 1.0 - way for k in range(strokes)])
+    moving = np.tile(np.arange(200) < 100, strokes)
+    force, stretch = np.zeros(position.size), 0.0
+    for k in range(1, position.size):
+        stretch = float(np.clip(stretch + position[k] - position[k - 1], -0.3, 0.3))
+        force[k] = 2.0 * stretch / 0.3
+    rest = np.tile(np.clip(np.arange(200) - 100, 0, None), strokes) * step
+    force = force * (1.0 - 0.1 * np.minimum(rest / 0.2, 1.0)) + offset_N
+    load = np.full(force.size, 5.0)
+    if unloads:
+        fall = np.linspace(1.0, 0.0, 100)
+        still = np.full(300, position[-1]) + 0.05 * np.concatenate([np.linspace(0, 1, 100), np.ones(200)])
+        position, moving = np.append(position, still), np.append(moving, np.zeros(300, bool))
+        load = np.append(load, np.concatenate([5.0 * fall, np.zeros(200)]))
+        force = np.append(force, np.concatenate([(force[-1] - offset_N) * fall, np.zeros(200)]) + offset_N)
+    time = np.arange(force.size) * step
+    noisy = force + 0.005 * rng.standard_normal(force.size)
+    return Trace("rig", time, noisy, position * 1e-3, columns={"normal_force_N": load}), moving
+
+
+def test_no_window_of_a_stroke_lies_over_the_dwell_at_its_end() -> None:
+    trace, moving = with_dwells()
+    pulls = [evaluate(piece, own) for piece, own in list(pieces_of(trace).values())[1:11]]
+    assert {"forward", "backward"} <= {flag for pull in pulls for flag in pull.flags}
+    for pull in pulls:
+        inside = (trace.time_s >= pull.window_s[0]) & (trace.time_s <= pull.window_s[1])
+        assert moving[inside].mean() > 0.97
+        assert pull.sliding_N == pytest.approx(2.0, rel=0.01)
+        assert abs(pull.zero_N) == pytest.approx(0.1, abs=0.02)

@@ -136,7 +136,7 @@ def _split(pulls: Pulls, plausible: tuple[float, float]) -> tuple[np.ndarray, fl
     factor = float(np.median(factors))
     either = []
     for part, log_factor in ((low, -factor), (high, factor)):
-        beside = _beside_law(pulls, pulls["log_force"] - np.where(part, log_factor, 0.0))
+        beside = _beside_line(pulls, pulls["log_force"] - np.where(part, log_factor, 0.0))
         wrong = part | (np.abs(beside - log_factor) < NEAR)
         log_ratio = pulls["log_force"] - np.where(wrong, log_factor, 0.0) - np.log(pulls["load_N"])
         samples = pulls["sample"]
@@ -160,15 +160,24 @@ def _far(pulls: Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, 
         yield int(k), float(left[k]), float(limit * spread[k])
 
 
-def _beside_law(pulls: Pulls, log_force: FloatArray) -> FloatArray:
-    """ln T less that of the law of its sample, shape (n,): T = mu N + T0, or T = a N^b where that leaves less."""
+def _beside_line(pulls: Pulls, log_force: FloatArray) -> FloatArray:
+    """ln T less that of a straight line T = mu N + T0 of its sample, shape (n,)."""
     left = np.empty_like(log_force)
     for sample in np.unique(pulls["sample"]):
         rows = np.flatnonzero(pulls["sample"] == sample)
         load, own = pulls["load_N"][rows], log_force[rows]
         line = _median_line(1.0 / load, np.exp(own) / load, load) * load
         left[rows] = own - (np.log(line) if (line > 0).all() else np.median(own))
-        if np.ptp(np.log(load)) > 2.0 * LOADS_APART and len(np.unique(pulls["level"][rows])) > FEWEST_LEVELS:
+    return left
+
+
+def _beside_law(pulls: Pulls, log_force: FloatArray) -> FloatArray:
+    """The same, or less T = a N^b of a sample of which that leaves less."""
+    left = _beside_line(pulls, log_force)
+    for sample in np.unique(pulls["sample"]):
+        rows = np.flatnonzero(pulls["sample"] == sample)
+        load, own = pulls["load_N"][rows], log_force[rows]
+        if len(np.unique(pulls["level"][rows])) > FEWEST_LEVELS:
             power = own - _median_line(np.log(load), own, load)
             left[rows] = min(left[rows], power, key=lambda off: float(np.abs(off).sum()))
     return left

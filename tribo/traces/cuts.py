@@ -22,6 +22,7 @@ _AT_REST_AS_ROUGH = 0.5  # share of the noise of the other direction below which
 _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
 _CLEARLY_APART = 1.25  # ratio of two speeds that the slope of a displacement tells apart
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
+_NO_STROKE = 0.5  # share of the usual force below which a piece tells nothing of the zero
 _BEFORE_DWELL = (0.6, 1.0)  # the same, as shares of its motion, of one that dwells at its end
 
 
@@ -181,10 +182,13 @@ def directions_of(
     if not forces.min() < 0 < forces.max():
         return tuple(-1 if force < 0 else 1 for force in forces), None
     u = np.array([wander(f, 1.0)[0] for f in middles])
-    side = np.where(forces >= (forces.max() + forces.min()) / 2.0, 1, -1)
+    middle = (forces.max() + forces.min()) / 2.0
+    side, apart = np.where(forces >= middle, 1, -1), np.abs(forces - middle)
+    slides = apart > _NO_STROKE * np.median(apart)  # not while the load is put on or taken off
     means, us = [], []
     for sign in (1, -1):
-        mine = side == sign
+        mine = (side == sign) & slides
+        mine = mine if mine.any() else side == sign
         count = int(mine.sum())
         means.append(float(forces[mine].mean()))
         scatter = float(forces[mine].std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0

@@ -372,7 +372,7 @@ def scatter_in_words(scatter: RepeatScatter | None) -> str:
         apart = f"scatters by {significant(100 * (scatter.factor - 1), 2)} %"
     return (
         f"{sentence_case(scatter.regime)} friction of {scatter.sample} at {significant(scatter.normal_load_N)} N, "
-        f"measured {scatter.n} times at one speed and hold, {apart}."
+        f"measured {scatter.n} times, {apart}."
     )
 
 
