@@ -235,6 +235,6 @@ def test_running_in_within_records_is_not_explained_as_a_matter_of_first_pulls()
     within = Verdict(verdict="named", causes=(Cause("run_in", 1.0, {}, shows=records),))
     over_pulls = Verdict(verdict="named", causes=(Cause("run_in", 1.0, {}),))
     assert [text for _, text in meanings(within)] == [
-        "Within one record, friction changes with the distance before it is steady."
+        "Within one record, friction changes with the distance."
     ]
     assert "first pulls" in meanings(over_pulls)[0][1]

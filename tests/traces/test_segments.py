@@ -219,6 +219,6 @@ def test_no_window_of_a_stroke_lies_over_the_dwell_at_its_end() -> None:
     assert {"forward", "backward"} <= {flag for pull in pulls for flag in pull.flags}
     for pull in pulls:
         inside = (trace.time_s >= pull.window_s[0]) & (trace.time_s <= pull.window_s[1])
-        assert moving[inside].mean() > 0.97
+        assert np.count_nonzero(~moving[inside]) <= 5  # a speed by displacement is a mean over so many samples
         assert pull.sliding_N == pytest.approx(2.0, rel=0.01)
         assert abs(pull.zero_N) == pytest.approx(0.1, abs=0.02)

@@ -364,14 +364,17 @@ def _chosen(
 
 def _goes_on(trace: Trace, before: Trace, piece: Trace) -> bool:
     """Whether a piece goes on as the one before it did, after a short disturbance of load or speed."""
+    from tribo.traces.drive import speed_level_m_s
+
     time = trace.time_s
     if piece.time_s[0] - before.time_s[-1] > _DISTURBED * (time[-1] - time[0]):
         return False
-    channels = ("normal_force_N", "speed_m_s", "rotation_rev_per_s")
-    values = [[p.columns[c] for p in (before, piece)] for c in channels if c in trace.columns]
-    pairs = [tuple(map(np.median, two)) for two in values]
-    pairs += [(np.sign(np.median(before.force_N)), np.sign(np.median(piece.force_N)))]
-    return bool(pairs) and all(abs(b - a) <= _DISTURBED * abs(a) for a, b in pairs)
+    there = {"normal_force_N", "speed_m_s", "rotation_rev_per_s"} & set(trace.columns)
+    pairs = [(float(np.median(before.columns[c])), float(np.median(piece.columns[c]))) for c in there]
+    one, other = (float(np.median(part.force_N)) for part in (before, piece))
+    if before.displacement_m is not None:
+        pairs += [(speed_level_m_s(before), speed_level_m_s(piece))]
+    return bool(pairs) and one * other > 0 and all(abs(b - a) <= _DISTURBED * abs(a) for a, b in pairs)
 
 
 def _carry_load(pieces: Sequence[Trace]) -> list[bool]:

@@ -194,9 +194,8 @@ def budget_tables(study: Study) -> list[dict[str, Any]]:
     order = findings.sample_numbers(study)
     parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
     load_N, campaign = study.ingested.campaign.judged_load_N(), study.ingested.campaign
-    at = f"{significant(campaign.nominal_pressure_Pa(load_N) / PA_PER_KPA)} kPa" if campaign.has_area else ""
-    at = at or f"{significant(load_N)} N"
-    return [{"at": at, **_budget_table(regime, part, list(order))} for regime, part in parts if not part.empty]
+    at = f"{campaign.nominal_pressure_Pa(load_N) / PA_PER_KPA:.3g} kPa" if campaign.has_area else f"{load_N:.3g} N"
+    return [{"judged_at": at, **_budget_table(regime, part, list(order))} for regime, part in parts if not part.empty]
 
 
 def _budget_table(regime: Regime, part: pd.DataFrame, order: list[str]) -> dict[str, Any]:

@@ -337,7 +337,8 @@ def friction_sentences(study: Study, verdict: Found | None = None) -> dict[str, 
 
     The size of a dependence that the ``verdict`` states is not told a second time by another measure.
     """
-    said = {(f.regime, f.name) for m in (verdict.misfits if verdict else ()) for f in _effects(m.shows)}
+    effects = [f for m in (verdict.misfits if verdict else ()) for f in _effects(m.shows)]
+    said = {(f.regime, name) for f in effects for name in (f.name, *f.same)}
     if not shown(study):
         return {"samples": [], "laws": [], "dependence": [], "oscillation": []}
     return {

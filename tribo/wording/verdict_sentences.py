@@ -544,7 +544,7 @@ def _sizes(named: Cause | Layer) -> list[str]:
     """The parameters of a cause or a law with their intervals."""
 
     def size(name: str, e: Estimate) -> str:
-        interval = f"({significant(e.low)} to {significant(e.high)})"
+        interval = f"({significant(e.low)} to {significant(e.high)})" if math.isfinite(e.low) else ""
         return f"{name.replace('_', ' ')} = {significant(e.value)} {interval} {e.unit}".rstrip()
 
     return [size(name, e) for name, e in named.parameters.items()]
