@@ -12,11 +12,12 @@ from tribo.diagnostics.direct_evidence import (
     certain_evidence,
     direct_evidence,
     rise_stiffening,
+    stroke_offset,
     zero_drift,
     zero_offset,
 )
 from tribo.diagnostics.observations import Observations, observe
-from tribo.records import Trace
+from tribo.records import Ingested, Pull, Trace
 
 from .synthetic import Design, hidden
 
@@ -247,3 +248,17 @@ def test_a_rise_that_falls_is_left_out_of_the_stiffening() -> None:
     found = rise_stiffening(series(conditions=replace(series().conditions, speed_m_s=speeds), rise_N_per_m=rise))
     assert found is not None
     assert found.value == pytest.approx(0.03, abs=0.003)
+
+
+def test_strokes_that_share_a_zero_are_as_uncertain_as_that() -> None:
+    def pulls(u_N: float) -> Ingested:
+        each = {
+            f"T{k}": Pull(f"T{k}", "r", sliding_N=2.0, zero_N=0.1 * sign, zero_u_N=u_N, flags=(way,))
+            for k, (way, sign) in enumerate([("forward", 1), ("backward", -1)] * 10)
+        }
+        return replace(hidden(), pulls=each)
+
+    assert stroke_offset(pulls(0.1)) is None
+    sure = stroke_offset(pulls(0.01))
+    assert sure is not None
+    assert sure.parameters["F0"].high - sure.parameters["F0"].low == pytest.approx(2 * 1.83 * 0.01, rel=0.01)

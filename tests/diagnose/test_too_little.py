@@ -76,3 +76,12 @@ def test_with_the_model_few_tests_one_load_or_one_sample_cannot_tell(few: Ingest
     assert found.verdict == "cannot_tell"
     assert reason in found.sentence
     assert "at least 12 pulls, 2 loads and 2 samples" in card_text(card_of(tribo.Study(few, ()), found))
+
+
+def test_columns_of_too_few_tests_are_not_said_to_be_tested(tmp_path: Path) -> None:
+    rows = [f"T{k},F,S{k},1.2,{f},{f},{20 + k},{3 * k}" for k, f in enumerate(SCATTERED_N)]
+    header = "test_id,sample,specimen,normal_load_N,static_N,sliding_N,temperature_C,strokes"
+    found = tribo.diagnose(tribo.ingest(tribo.load_campaign(written(tmp_path / "c", TOML, [header, *rows])))).verdict
+    assert found.verdict == "cannot_tell"
+    assert "same column" not in found.text
+    assert "It was tested" not in found.text

@@ -261,3 +261,14 @@ def test_the_zero_is_taken_at_rest_where_the_drive_shows_the_rest(tmp_path: Path
     (pull,) = stages.ingest(load_campaign(tmp_path / "c")).pulls.values()
     assert pull.sliding_N == pytest.approx(1.0, rel=0.01)
     assert rows_of(tmp_path / "c")[0]["speed_mm_s"] == "15.7"  # 2 pi 2.5 mm at one turn a second
+
+
+def test_what_init_writes_for_an_unknown_area_is_a_doubt_of_the_results(tmp_path: Path) -> None:
+    time = np.arange(600) * 0.1
+    ratio = 0.45 + 0.002 * np.random.default_rng(2).standard_normal(600)
+    rows = [f"{t:.1f}\t{0.2 * t:.2f}\t{mu:.5f}\t30.0" for t, mu in zip(time, ratio, strict=True)]
+    head = "Time (s)\tDispl (microns)\tFriction\tNormal stress (MPa)"
+    raw = raw_folder(tmp_path / "raw", {"gouge_1.txt": "\n".join([head, *rows]) + "\n"})
+    assert run("init", tmp_path / "c", "--from", raw).exit_code == 0
+    said = " ".join(run("ingest", tmp_path / "c", "-o", tmp_path / "out").output.split())
+    assert "the nominal area is 1 mm2, which stands where none is known" in said

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from other_fits import fit_power_law
 
+import tribo
 from tribo.errors import FitError
 from tribo.fitting import fit_samples, uncertainty_budget
 from tribo.fitting.budget import DEFAULTS, PRESSURE_PA
@@ -148,3 +150,11 @@ def test_a_law_without_tau0_has_no_budget() -> None:
     (fit,) = fit_power_law(table, "static", AREA)
     with pytest.raises(FitError, match="a budget needs a fitted law"):
         uncertainty_budget(table, fit, {})
+
+
+def test_the_force_is_judged_at_a_load_that_was_measured() -> None:
+    campaign = tribo.load_campaign(tribo.data_dir() / "example")
+    loads = [test.normal_load_N for test in campaign.tests]
+    assert campaign.judged_load_N() == pytest.approx(10e3 * campaign.area_m2)
+    wide = replace(campaign, nominal_area_m2=100 * campaign.area_m2)  # 10 kPa lie far above all loads
+    assert wide.judged_load_N() == pytest.approx(float(np.median(loads)))
