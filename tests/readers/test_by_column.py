@@ -177,6 +177,8 @@ def test_strokes_of_the_micrometre_rig_have_half_the_difference_of_both_directio
         for pull, way in ((one, 0), (other, 1)):
             moved = position[(time >= pull.window_s[0]) & (time <= pull.window_s[1])]
             assert abs(moved[-1] - moved[0]) < 240.0, way
+            steps = np.abs(np.diff(moved))  # the drive dwells for half of the time, and no window lies over a dwell
+            assert np.mean(steps > 0.05 * steps.max()) > 0.75
         if means[0] * means[1] < 0:
             differences.append(((one.sliding_N + other.sliding_N) / 2, abs(means[0] - means[1]) / 2))
     found, by_column = np.array(differences).T
