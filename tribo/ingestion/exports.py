@@ -372,8 +372,9 @@ def _goes_on(trace: Trace, before: Trace, piece: Trace) -> bool:
     there = {"normal_force_N", "speed_m_s", "rotation_rev_per_s"} & set(trace.columns)
     pairs = [(float(np.median(before.columns[c])), float(np.median(piece.columns[c]))) for c in there]
     one, other = (float(np.median(part.force_N)) for part in (before, piece))
-    if before.displacement_m is not None:
-        pairs += [(speed_level_m_s(before), speed_level_m_s(piece))]
+    if there <= {"normal_force_N"}:  # the displacement tells the speed
+        speeds = speed_level_m_s(before), speed_level_m_s(piece)
+        pairs += [speeds] if any(map(math.isfinite, speeds)) else []
     return bool(pairs) and one * other > 0 and all(abs(b - a) <= _DISTURBED * abs(a) for a, b in pairs)
 
 
