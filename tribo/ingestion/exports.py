@@ -382,11 +382,12 @@ def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
     """Which pieces carry a load for half of their time; all of them where none was recorded."""
     from tribo.traces import load_of
 
-    loads = np.nan_to_num([load_of(piece)[0] for piece in pieces])
-    loads *= np.sign(loads[np.argmax(np.abs(loads))])  # a load cell may show less than nothing before contact
+    loads = np.nan_to_num(np.abs([load_of(piece)[0] for piece in pieces]))
     recorded = [piece.columns.get("normal_force_N") for piece in pieces]
-    usual = [math.inf if load is None else float(np.median(np.abs(load))) for load in recorded]
-    loads = np.minimum(loads, usual)
+    if all(load is not None and np.isfinite(load).all() for load in recorded):
+        usual = np.array([float(np.median(load)) for load in recorded if load is not None])
+        side = np.sign(usual[np.argmax(np.abs(usual))])  # a load cell may show less than nothing before contact
+        loads = np.minimum(loads, side * usual)
     return [bool(load >= _UNLOADED * loads.max()) for load in loads]
 
 
