@@ -151,6 +151,16 @@ def free_scopes(c: Conditions, *, few: bool = False) -> tuple[list[WrittenLaw], 
     return [scopes[k] for k in kept], cost[kept]
 
 
+def certain_pair(search: FreeSearch, residual: FloatArray, by: float) -> tuple[str, ...] | None:
+    """The two columns of the likeliest surface for a residual (n, 2); None where those of another one come as close as
+    ``by`` in net log likelihood, so that the campaign does not say which column is the second."""
+    best = search.evidence(residual[None])[0].max(axis=1)
+    ranked = sorted(
+        ((float(e), each) for e, each in zip(best, search.columns, strict=True) if len(each) > 1), reverse=True
+    )
+    return None if len(ranked) > 1 and ranked[1][0] > ranked[0][0] - by else ranked[0][1]
+
+
 def likeliest(
     search: FreeSearch, residual: FloatArray, *numbers: int
 ) -> list[tuple[float, tuple[str, ...], WrittenLaw]]:

@@ -23,7 +23,7 @@ from tribo.diagnostics.inference import estimates, gain, informed_share
 from tribo.diagnostics.model import Acting, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
 from tribo.lawsearch.free_curves import FreeCurve, at_knots, better_left_out, curve_of, fitted_curve, knots_of
-from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, free_columns, free_scopes, likeliest
+from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, certain_pair, free_columns, free_scopes, likeliest
 from tribo.lawsearch.grammar import (
     BOTH,
     LOAD_TERM,
@@ -258,13 +258,15 @@ def _likelier_surface(
 
 def _settled_surface(model: ModelFit, surface: FreeCurve, without: Collection[str]) -> FreeCurve | None:
     """From a first surface on, the one that is likeliest at the noise that it leaves itself; None where a curve of one
-    column is as likely there."""
+    column, or a surface of other columns, is as likely there."""
     sets = free_columns(model.setup.observations.conditions, without)
     for _ in range(ROUNDS):
         at = Background(model, _with_heights(surface))
         left = replace(at.without, residual=at.residual)
-        _, columns, _ = likeliest(FreeSearch(left, *free_scopes(at.conditions, few=True), sets), at.residual, 2)[0]
-        own = [each for each in sets if set(each) <= set(columns)]
+        pair = certain_pair(FreeSearch(left, *free_scopes(at.conditions, few=True), sets), at.residual, CLOSE)
+        if pair is None:
+            return None
+        own = [each for each in sets if set(each) <= set(pair)]
         search = FreeSearch(left, *free_scopes(at.conditions), own)
         (alone, _, _), (apart, columns, scope) = likeliest(search, at.residual, 1, 2)
         if apart < alone + CLOSE:
