@@ -22,6 +22,7 @@ _AT_REST_AS_ROUGH = 0.5  # share of the noise of the other direction below which
 _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
 _CLEARLY_APART = 1.25  # ratio of two speeds that the slope of a displacement tells apart
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
+_DWELLS = 0.5  # share of its motion for which a drive stands still that dwells at the end of a stroke
 _NO_STROKE = 0.5  # share of the usual force below which a piece tells nothing of the zero
 _BEFORE_DWELL = (0.6, 1.0)  # the same, as shares of its motion, of one that dwells at its end
 
@@ -173,7 +174,7 @@ def directions_of(
     middles = []
     for piece in pieces:
         size, stop = piece.force_N.size, stroke_end(piece)
-        if stop is not None and stop < size:  # it dwells: the force has come to its level late in the motion
+        if stop is not None and size - stop > _DWELLS * stop:  # the force has come to its level late in the motion
             start, end = (int(share * stop) for share in _BEFORE_DWELL)
         else:
             start, end = (int(share * size) for share in _MIDDLE)
