@@ -193,8 +193,10 @@ def test_the_damper_has_the_mean_force_of_its_windows() -> None:
         (table,) = read_blocks(file)
         pieces = pieces_of(table, PullOptions(test=a_test()))
         pulls = [evaluate(piece, own) for piece, own in pieces.values()]
+        slides = [math.isfinite(pull.sliding_N) for pull in pulls]
+        assert all(slides[1:]), file.name  # the first piece may end before the damper slides
         assert len(pulls) > 5, file.name
-        for pull in pulls:
+        for pull in pulls if slides[0] else pulls[1:]:
             inside = (time >= pull.window_s[0]) & (time <= pull.window_s[1])
             way = -1.0 if "backward" in pull.flags else 1.0
             by_column = way * force[inside].mean() - pull.zero_N
