@@ -81,7 +81,7 @@ FAULTS = [
     Fault("unknown_unit", table("Time [s],Force [foo]", TIME, FORCE)),
     Fault("ambiguous_unit", table("Time [s],Force [g],ax [m/s2]", TIME, FORCE, FORCE)),
     Fault("ambiguous_mark", table("Time [s];Force [N]", 1 + TIME, 1 + FORCE, mark=";").replace(".", ",")),
-    Fault("time_of_day", "No,Time,Force [N]\n" + "".join(f"{k},09:00:{k:02d},{FORCE[k]:.3f}\n" for k in range(50)),
+    Fault("time_of_day", "No,Time,Force [N]\n" + "".join(f"{k},Mo 09:00:{k:02d},{FORCE[k]:.3f}\n" for k in range(50)),
           fill={"NAME": "No"}),
     Fault("missing_column", table("clock,ch1", TIME, FORCE), fill={"NAME [unit]": "ch1 [N]"},
           columns={"time": "#1 [s]"}),

@@ -73,9 +73,9 @@ def test_a_gain_within_two_standard_errors_may_be_chance() -> None:
     assert "may be due to chance" in verdict_in_words(verdict_of({**NAMED, "gain": gain}))["gain"]
 
 
-def test_a_number_that_does_not_exist_is_a_dash() -> None:
+def test_an_interval_that_does_not_exist_is_left_out() -> None:
     cause = {**NAMED["causes"][0], "parameters": {"c": {"value": 1.0, "low": None, "high": None, "unit": ""}}}
-    assert verdict_in_words(verdict_of({**NAMED, "causes": [cause]}))["causes"][0]["sizes"] == ["c = 1.00 (– to –)"]
+    assert verdict_in_words(verdict_of({**NAMED, "causes": [cause]}))["causes"][0]["sizes"] == ["c = 1.00"]
 
 
 def test_a_study_without_a_diagnosis_does_not_speak_of_one(study: Study) -> None:

@@ -195,7 +195,8 @@ def budget_tables(study: Study) -> list[dict[str, Any]]:
     parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
     load_N, campaign = study.ingested.campaign.judged_load_N(), study.ingested.campaign
     at = f"{campaign.nominal_pressure_Pa(load_N) / PA_PER_KPA:.3g} kPa" if campaign.has_area else f"{load_N:.3g} N"
-    return [{"judged_at": at, **_budget_table(regime, part, list(order))} for regime, part in parts if not part.empty]
+    said = f"contribution of each component to the variance of T at {at}, in percent"
+    return [{"caption": said, **_budget_table(regime, part, list(order))} for regime, part in parts if not part.empty]
 
 
 def _budget_table(regime: Regime, part: pd.DataFrame, order: list[str]) -> dict[str, Any]:

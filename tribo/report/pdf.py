@@ -90,7 +90,7 @@ def record_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str
         "directions": summary["directions"],
         "budget": [
             {
-                "title": _title(table["regime"]), "judged_at": table["judged_at"], "sentence": table["sentence"],
+                "title": _title(table["regime"]), "caption": table["caption"], "sentence": table["sentence"],
                 "head": ["Sample", *table["components"], "u(T), combined (N)"],
                 "rows": [[sample, *shares, combined] for sample, shares, combined in table["rows"]],
             }

@@ -19,7 +19,16 @@ from tribo.mechanisms import MECHANISMS, mechanism
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.vocabulary import COLUMNS, OBSERVABLES, ColumnWords, in_words
 from tribo.wording.law_sentences import each_value, law_sentence, law_test, size_sentence, tied_laws
-from tribo.wording.numerals import counted, interval, joined, p_text, sentence_case, signed, with_uncertainty
+from tribo.wording.numerals import (
+    counted,
+    interval,
+    joined,
+    p_text,
+    sentence_case,
+    signed,
+    true_minus,
+    with_uncertainty,
+)
 
 BETWEEN = {
     "mean": "mean", "bend": "the ends above the middle", "ends": "from the low to the high end",
@@ -288,7 +297,7 @@ def _running_in(records: Sequence[RunningIn]) -> str:
 
 def _offset(layer: Layer) -> str:
     (forward, backward), offset = layer.shows, layer.parameters["F0"]
-    value, low, high = (f"{x:.3g}".replace("-", "−") for x in (offset.value, offset.low, offset.high))
+    value, low, high = (true_minus(f"{x:.3g}") for x in (offset.value, offset.low, offset.high))
     return (
         f"The force recorded in {forward} forward and {backward} backward strokes is offset by {value} N "
         f"(90 % interval {low} to {high} N), {abs(layer.effect_percent):.0f} % "
