@@ -229,7 +229,7 @@ def test_a_plan_needs_no_export(small_campaign: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0
     found = {f["mechanism"]: f for f in json.loads(result.stdout)["findings"]}
     assert found["velocity_dependence"]["why"]
-    assert found["pulley_friction"]["why"]
+    assert found["pull_angle"]["why"]
 
 
 def test_suction_raises_the_simulated_friction_of_a_patterned_sample(tmp_path: Path) -> None:

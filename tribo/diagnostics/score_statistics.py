@@ -25,7 +25,7 @@ from tribo.records import FloatArray
 
 AS_FITTED = 1  # of the steps of the sizes, the first
 TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is left to see
-SEEN = 1e-3  # share of a mechanism's effect that the calibration must leave, and of that what all else must leave
+SEEN = 1e-3  # share of a mechanism's effect that must be left once all else is free
 Index = NDArray[np.int64]
 Absorption = Literal["absorbed", "hidden"]
 
@@ -335,12 +335,9 @@ def _absorbed(f: ModelFit, every_start: Mapping[str, FloatArray]) -> dict[str, A
     for name, columns in every_start.items():
         whole = np.sum(columns**2, axis=(0, 1))
         kept = np.sum(f.cleared(columns)[0] ** 2, axis=0) * np.mean(np.diag(f.noise.repeat))
-        beyond_law = np.sum(f.beyond_law(columns) ** 2, axis=(0, 1))
-        left = beyond_law >= SEEN * np.maximum(whole, 1e-30)
-        if columns.shape[2] and not left.any():
-            found[name] = "absorbed"
-        elif columns.shape[2] and not np.any(left & (kept >= SEEN * beyond_law)):
-            found[name] = "hidden"
+        if columns.shape[2] and not np.any(kept >= SEEN * np.maximum(whole, 1e-30)):
+            beside_law = np.sum(f.beyond_law(columns) ** 2, axis=(0, 1))
+            found[name] = "hidden" if np.any(beside_law >= SEEN * np.maximum(whole, 1e-30)) else "absorbed"
     return found
 
 
