@@ -17,7 +17,7 @@ from tribo.diagnostics.effect_sizes import bend_percent, change_percent, mean_pe
 from tribo.figures import style
 from tribo.records import FloatArray
 from tribo.vocabulary import axis_label, short_label
-from tribo.wording.numerals import true_minus
+from tribo.wording.numerals import signed
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
@@ -320,7 +320,7 @@ def _draw_panel(ax: Axes, part: pd.DataFrame, covariates: list[str], norm: TwoSl
 
 
 def _signed(percent: float) -> str:
-    return true_minus(f"{percent:+.0f}") if abs(percent) >= 0.5 else "0"
+    return signed(percent) if abs(percent) >= 0.5 else "0"
 
 
 MISFIT = style.FigureOf(

@@ -65,8 +65,7 @@ def by_the_clock(source: Source, layout: Layout, given: Given) -> tuple[Source, 
     seconds = seconds + _DAY_S * days
     for k, value in zip(told, seconds - seconds[0], strict=True):
         cells[k][at] = f"{value:.6f}".replace(".", layout.decimal)
-        mark = " " if layout.delimiter == " " else layout.delimiter
-        rows[k] = mark.join(f'"{c}"' if layout.delimiter in c and c else c for c in cells[k])
+        rows[k] = layout.delimiter.join(f'"{c}"' if layout.delimiter in c and c else c for c in cells[k])
     text = "\n".join(rows).encode(source.codec, errors="replace")
     data = bytes(source.data[: layout.start]) + text + bytes(source.data[layout.end :])
     return replace(source, data=data), given.with_hints((Hint("time", f"#{at + 1} [s]", REASON),))

@@ -17,13 +17,14 @@ from tribo.records import PA_PER_KPA, REGIMES, Campaign, LawFit, Override, Pull,
 from tribo.vocabulary import label_with_unit
 from tribo.wording.numerals import (
     counted,
+    interval,
     joined,
     loads_in_words,
     p_text,
     percent,
+    signed,
     significant,
     span,
-    true_minus,
     with_uncertainty,
 )
 
@@ -323,11 +324,11 @@ def friction_sentence(study: Study) -> str:
         if off:
             worst = max((load for a in off for load in a.loads), key=lambda load: abs(load.deviation))
             a = next(a for a in off if worst in a.loads)
-            value, low, high = (true_minus(f"{100 * (x - 1):+.0f}") for x in (worst.ratio, worst.low, worst.high))
+            value, low, high = (100 * (x - 1) for x in (worst.ratio, worst.low, worst.high))
             return (
                 f"Measured friction differs most from the model for {a.regime} friction of {a.sample} at "
-                f"{significant(worst.normal_load_N)} N, by {value} % (95 % interval {low} to {high} %); no diagnosis "
-                "was made."
+                f"{significant(worst.normal_load_N)} N, by {signed(value)} % (95 % interval {interval(low, high)}); no "
+                "diagnosis was made."
             )
     return ratio_of_samples(study)
 
@@ -337,10 +338,10 @@ def friction_sentences(study: Study, verdict: Found | None = None) -> dict[str, 
 
     The size of a dependence that the ``verdict`` states is not told a second time by another measure.
     """
-    effects = [f for m in (verdict.misfits if verdict else ()) for f in _effects(m.shows)]
-    said = {(f.regime, name) for f in effects for name in (f.name, *f.same)}
     if not shown(study):
         return {"samples": [], "laws": [], "dependence": [], "oscillation": []}
+    effects = [f for m in (verdict.misfits if verdict else ()) for f in _effects(m.shows)]
+    said = {(f.regime, name) for f in effects for name in (f.name, *f.same)}
     return {
         "samples": list(_samples(study)),
         "laws": list(_chosen_laws(study)),
@@ -442,11 +443,11 @@ def _inseparable(table: pd.DataFrame) -> Iterator[str]:
         for row in _rows(table)
         for other in row["inseparable_from"]
     ]
+    series = {label_with_unit(name) for name in SERIES}  # places of a series, which nobody can part
     for sample, one, other in list(dict.fromkeys(pairs))[:MOST_SAID]:
         said = f"For {sample}, {one} and {other} vary together, so their effects cannot be separated."
-        series = {label_with_unit(name) for name in SERIES}
-        known = {one, other} <= series  # places of a series, which nobody can part
-        yield said if known else f"{said} Next test: repeat several values of {one} in random order of {other}."
+        test = f" Next test: repeat several values of {one} in random order of {other}."
+        yield said if {one, other} <= series else said + test
 
 
 def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
