@@ -56,7 +56,7 @@ def test_other_seeds_have_other_files_and_those_of_others_are_removed(cells: tup
 def test_a_cluster_gives_the_bits_of_threads(cells: tuple[Cell, ...], tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     here = run_cells(cells, tmp_path / "here", jobs=2)
-    options = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    options = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": "127.0.0.1:0"}
     with distributed.LocalCluster(**options) as cluster:
         away = run_cells(cells, tmp_path / "away", scheduler=cluster.scheduler_address)
     assert here.equals(away)

@@ -36,7 +36,7 @@ RESULTS = ["static_friction", "sliding_friction", "peak_s", "window_end_s"]
 def two_workers() -> Iterator[str]:
     """The address of a dask scheduler with two worker processes."""
     distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": "127.0.0.1:0"}
     with distributed.LocalCluster(**options) as cluster:
         yield cluster.scheduler_address
 

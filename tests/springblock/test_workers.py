@@ -28,7 +28,7 @@ def read(run: Any) -> dict[str, float]:
 @contextmanager
 def cluster(workers: int) -> Iterator[str]:
     """Workers in threads of this process."""
-    options = {"n_workers": workers, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    options = {"n_workers": workers, "threads_per_worker": 1, "processes": False, "dashboard_address": "127.0.0.1:0"}
     with distributed.LocalCluster(**options) as started:
         yield started.scheduler_address
 
