@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -825,19 +825,18 @@ class Ingested:
             for test in tests
         ]
         table = pd.DataFrame(rows)
+        more: dict[str, list[Any]] = {}
         for name in CONDITIONS:
             values = [getattr(test, name) for test in tests]
             if any(value not in (None, "") for value in values):
-                table[name] = values
+                more[name] = values
         for name in dict.fromkeys(name for test in tests for name in test.covariates):
-            if name not in table:
+            if name not in table and name not in more:
                 cells = [test.covariates.get(name, "") for test in tests]
                 filled = [cell for cell in cells if cell]
-                if filled and all(map(_PLAIN_NUMBER.fullmatch, filled)):
-                    table[name] = [float(cell) if cell else float("nan") for cell in cells]
-                else:
-                    table[name] = cells
-        return table
+                plain = filled and all(map(_PLAIN_NUMBER.fullmatch, filled))
+                more[name] = [float(cell) if cell else float("nan") for cell in cells] if plain else cells
+        return pd.concat([table, pd.DataFrame(more, table.index)], axis=1) if more else table
 
 
 READINGS = ("static_N", "static_u_N", "sliding_N", "sliding_u_N")

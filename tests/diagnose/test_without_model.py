@@ -65,6 +65,16 @@ def diagnosed(ingested: Ingested) -> Verdict:
     return stages.diagnosis_without_model(study).verdict
 
 
+def test_one_law_is_found_among_a_hundred_columns_of_noise_and_nothing_among_noise_alone(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    noise: Further = lambda row: {f"c{k:03d}": f"{rng.standard_normal():.4f}" for k in range(100)}  # noqa: E731
+    found = verdict_of(made(tmp_path / "law", of_speed, columns=noise))
+    assert [cause.mechanism for cause in found.causes] == ["velocity_dependence"]
+    nothing = verdict_of(made(tmp_path / "noise", lambda row: 0.0, columns=noise))
+    assert nothing.verdict == "no_misfit"
+    assert "c010 and 91 more columns." in nothing.text  # and bath, run order and speed
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_nothing_is_named_where_friction_follows_its_laws_alone(tmp_path: Path, seed: int) -> None:
     found = verdict_of(made(tmp_path / "c", lambda row: 0.0, seed))

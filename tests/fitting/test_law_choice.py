@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.stats
+from scipy.stats import rankdata, spearmanr
 
 from tribo.fitting.alternatives import CANDIDATES, compared_laws, dependence, fit_candidate, force_N
 from tribo.fitting.linear import levels_of, meant_to_be_one
@@ -103,3 +106,40 @@ def test_the_force_of_a_law_by_its_name_is_that_of_its_fit() -> None:
         values, _, force_at = fit_candidate(law, load, force)
         a, b = (*values, np.nan)[:2]
         np.testing.assert_allclose(force_N(law.name, a, b, load), force_at(load))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_columns_are_inseparable_where_ranks_correlate_over_five_tests_or_more_that_record_both(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    order, load = rng.permutation(20), np.tile([1.0, 2.0, 4.0, 8.0], 5)
+    one = rng.standard_normal(20)
+    columns = {f"c{k}": rng.choice([-1, 1]) * one + rng.choice([0.05, 0.3]) * rng.standard_normal(20) for k in range(8)}
+    columns["rounded"] = np.round(one)
+    for name in ("c1", "c2", "c3"):
+        columns[name][rng.random(20) < 0.4] = np.nan
+    made = ingested(order, load, np.full(20, 0.5) + 0.01 * rng.standard_normal(20))
+    tests = tuple(
+        replace(t, covariates={name: f"{values[k]}" for name, values in columns.items()})
+        for k, t in enumerate(made.campaign.tests)
+    )
+    found = dependence(replace(made, campaign=replace(made.campaign, tests=tests))).set_index("variable")
+    inseparable = 0
+    for name, values in columns.items():
+        for other in columns.keys() - {name}:
+            both = np.isfinite(values) & np.isfinite(columns[other])
+            expected = both.sum() >= 5 and abs(spearmanr(values[both], columns[other][both]).statistic) >= 0.95
+            assert (other in found.loc[name, "inseparable_from"]) == expected
+            inseparable += expected
+    assert 0 < inseparable < 72
+
+
+def test_ranks_of_columns_without_gaps_are_taken_once_and_not_for_every_pair(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(1)
+    made = ingested(rng.permutation(20), np.tile([1.0, 2.0, 4.0, 8.0], 5), 0.5 + 0.01 * rng.standard_normal(20))
+    tests = tuple(
+        replace(t, covariates={f"c{k}": f"{rng.standard_normal()}" for k in range(30)}) for t in made.campaign.tests
+    )
+    times: list[int] = []
+    monkeypatch.setattr(scipy.stats, "rankdata", lambda *a, **k: times.append(1) or rankdata(*a, **k))
+    assert len(dependence(replace(made, campaign=replace(made.campaign, tests=tests)))) == 32
+    assert len(times) == 1

@@ -128,28 +128,25 @@ def same_columns(columns: Sequence[Regressor]) -> tuple[tuple[str, ...], ...]:
     names, and a number beside names, if each value of one stands beside one value of the other.
     """
     groups: list[list[str]] = []
-    first: list[Regressor] = []
+    place: dict[tuple[str, tuple[int, ...]], int] = {}  # the first group whose first column is so ordered
     seen: set[str] = set()
     for column in columns:
         if column.name in seen:
             continue
         seen.add(column.name)
-        for k, other in enumerate(first):
-            if _is_same(column, other):
-                groups[k].append(column.name)
-                break
-        else:
-            first.append(column)
-            groups.append([column.name])
+        named, appearance = column.kind == "names", _appearance(column.order)
+        highest = max(column.order)
+        falling = tuple(highest - rank if rank >= 0 else rank for rank in column.order)
+        own = ("names", appearance) if named else ("numbers", min(column.order, falling))
+        alike = (("any", appearance),) if named else (own, ("names", appearance))
+        there = [place[key] for key in alike if key in place]
+        if there:
+            groups[min(there)].append(column.name)
+            continue
+        for key in (own, ("any", appearance)):
+            place.setdefault(key, len(groups))
+        groups.append([column.name])
     return tuple(tuple(names) for names in groups if len(names) > 1)
-
-
-def _is_same(one: Regressor, other: Regressor) -> bool:
-    if "names" in (one.kind, other.kind):
-        return _appearance(one.order) == _appearance(other.order)
-    highest = max(one.order)
-    falling = tuple(highest - rank if rank >= 0 else rank for rank in one.order)
-    return other.order in (one.order, falling)
 
 
 def _appearance(order: Sequence[int]) -> tuple[int, ...]:
@@ -406,15 +403,16 @@ def _chances(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Generato
     bases = {k: b for k, c in enumerate(columns) if (b := f.basis(c, f.at)).shape[1]}
     if not bases or f.dof < 3:
         return {}
-    strength = _strengths(f.left[:, None], list(bases.values()), f.dof, f.floor)[0]
+    d = np.array([b.shape[1] for b in bases.values()])
+    strength = _strengths(_ratios(f.left[:, None], list(bases.values()), f.dof, f.floor), d, f.dof)[:, 0]
     chance = _by_chance(f, [columns[k] for k in bases], rng)
-    # the strongest first: equal p values keep that order
-    found = {k: share_beyond(chance, float(s)) for k, s in zip(bases, strength, strict=True)}
-    return dict(sorted(found.items(), key=lambda item: -float(strength[list(bases).index(item[0])])))
+    strongest_first = np.argsort(-strength, kind="stable")  # equal p values keep that order
+    places = list(bases)
+    return {places[k]: share_beyond(chance, float(strength[k])) for k in strongest_first}
 
 
-def _strengths(left: FloatArray, bases: Sequence[FloatArray], dof: int, floor: float) -> FloatArray:
-    """Minus the log of the p value of the F test of every column, (replicates, columns).
+def _ratios(left: FloatArray, bases: Sequence[FloatArray], dof: int, floor: float) -> FloatArray:
+    """The F statistic of every column, (columns, replicates).
 
     The variance of the scatter is at least ``floor``.
     """
@@ -423,9 +421,14 @@ def _strengths(left: FloatArray, bases: Sequence[FloatArray], dof: int, floor: f
     for base in bases:
         d = base.shape[1]
         explained = np.sum((base.T @ left) ** 2, axis=0)
-        ratio = (explained / d) / np.maximum((total - explained) / max(dof - d, 1), floor)
-        found.append(-f_distribution.logsf(ratio, d, max(dof - d, 1)))
-    return np.column_stack(found)
+        found.append((explained / d) / np.maximum((total - explained) / max(dof - d, 1), floor))
+    return np.array(found)
+
+
+def _strengths(ratios: FloatArray, d: NDArray[np.int64], dof: int) -> FloatArray:
+    """Minus the log of the p value of F statistics (columns, replicates) with ``d`` (columns,) degrees of freedom."""
+    d = d[:, None]
+    return np.asarray(-f_distribution.logsf(ratios, d, np.maximum(dof - d, 1)))
 
 
 def _by_chance(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Generator) -> FloatArray:
@@ -443,7 +446,10 @@ def _by_chance(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Genera
     strongest = np.zeros(REPLICATES)
     for at in np.unique(chosen):
         bases = [b for c in columns if (b := f.basis(c, int(at))).shape[1]]
-        strongest[chosen == at] = _strengths(lefts[at][:, chosen == at], bases, f.dof, f.floor).max(axis=1)
+        ratios, d = _ratios(lefts[at][:, chosen == at], bases, f.dof, f.floor), np.array([b.shape[1] for b in bases])
+        sizes = np.unique(d)
+        highest = np.array([ratios[d == size].max(axis=0) for size in sizes])  # of equal size, the strongest
+        strongest[chosen == at] = _strengths(highest, sizes, f.dof).max(axis=0)
     return strongest
 
 

@@ -7,9 +7,11 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import (
@@ -387,6 +389,7 @@ SAME_COLUMN = 0.95  # rank correlation of two variables from which on their effe
 ONE_SPEED = 1.05  # largest over smallest speed up to which tests were made at one
 _FEWEST = 5
 _FEWEST_VALUES = 2
+_ROUNDING = 1e-9  # of a correlation of ranks: that of nine pairs may be 0.95 exactly
 
 
 def test_values(test: Test) -> dict[str, float]:
@@ -447,12 +450,15 @@ def dependence(ingested: Ingested) -> pd.DataFrame:
 
     points = measured_points(ingested)
     found = []
+    of_tests: dict[tuple[str, ...], NDArray[np.bool_]] = {}  # the same in both regimes
     for (sample, regime), part in points.groupby(["sample", "regime"], sort=False) if len(points) else ():
-        names = variables_of(part)
-        for name in names:
+        names, tests = variables_of(part), tuple(part["test_id"])
+        if (together := of_tests.get(tests)) is None:
+            together = of_tests[tests] = _together(part[names].to_numpy(float))
+        for name, with_others in zip(names, together, strict=True):
             row = _one(part, name)
             if row:
-                others = tuple(o for o in names if o != name and _same(part, name, o))
+                others = tuple(o for o, same in zip(names, with_others, strict=True) if same)
                 found.append({"sample": sample, "regime": regime, **row, "inseparable_from": others})
     table = pd.DataFrame(found, columns=DEPENDENCE_COLUMNS)
     return table.assign(p_adjusted=_holm(table["p"].to_numpy(float)))
@@ -474,13 +480,30 @@ def _one(part: pd.DataFrame, name: str) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _same(part: pd.DataFrame, one: str, other: str) -> bool:
-    from scipy.stats import spearmanr
+def _together(values: FloatArray) -> NDArray[np.bool_]:
+    """Which columns of ``values`` (n, k) cannot be separated, (k, k): by their ranks where both are known."""
+    from scipy.stats import rankdata
 
-    known = part[np.isfinite(part[one]) & np.isfinite(part[other])]
-    if len(known) < _FEWEST or known[one].nunique() < _FEWEST_VALUES or known[other].nunique() < _FEWEST_VALUES:
-        return False
-    return abs(float(spearmanr(known[one], known[other]).statistic)) >= SAME_COLUMN
+    known = np.isfinite(values)
+    masks, mask_of = np.unique(known, axis=1, return_inverse=True)
+    mask_of = mask_of.reshape(-1)
+    together = np.zeros((values.shape[1],) * 2, bool)
+    for one, other in combinations_with_replacement(range(masks.shape[1]), 2):
+        both = masks[:, one] & masks[:, other]
+        if both.sum() < _FEWEST:
+            continue
+        columns = np.flatnonzero((mask_of == one) | (mask_of == other))
+        ranks = rankdata(values[np.ix_(both, columns)], axis=0)
+        ranks -= ranks.mean(axis=0)
+        length = np.sqrt(np.sum(ranks**2, axis=0))
+        there = length > 0
+        columns, unit = columns[there], ranks[:, there] / length[there]
+        alike = np.abs(unit.T @ unit) >= SAME_COLUMN - _ROUNDING
+        first, second = mask_of[columns] == one, mask_of[columns] == other
+        pairs = np.outer(first, second) | np.outer(second, first)
+        together[np.ix_(columns, columns)] |= alike & pairs
+    np.fill_diagonal(together, False)
+    return together
 
 
 def _holm(p: FloatArray) -> FloatArray:

@@ -54,6 +54,7 @@ from tribo.wording.part_sentences import (
 from tribo.wording.table_sentences import published_evidence, published_sentence
 
 MOST_LAWS = 4
+MOST_TESTED = 12
 MOST_COPIED = 3  # groups of tests with equal forces that are listed
 FACTOR = 1.1  # from which on a scatter is said as a factor instead of in percent
 HEADINGS = {
@@ -404,8 +405,10 @@ def _without_model(v: Verdict) -> Verdict:
     if shows.lack is not None:
         evidence = list(filter(None, [scatter_in_words(shows.lack.scatter)]))
     elif not v.causes:
-        tested = joined(sorted(map(in_words, shows.columns)))
-        evidence = [f"Tested: {tested}." if tested else "No further column varies."]
+        tested = sorted(map(in_words, shows.columns))
+        if len(tested) > MOST_TESTED:
+            tested = [*tested[:MOST_TESTED], f"{len(tested) - MOST_TESTED} more columns"]
+        evidence = [f"Tested: {joined(tested)}." if tested else "No further column varies."]
     evidence += [same_columns_sentence(names) for names in shows.same] + copied_sentence(shows.copied)
     if v.causes:
         names = "; ".join(dict.fromkeys(name_in_words(c.mechanism) for c in v.causes))
