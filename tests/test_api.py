@@ -28,6 +28,7 @@ def test_every_public_name_is_there_documented_and_no_package(name: str) -> None
     assert (found.__doc__ or "").strip()
 
 
+@pytest.mark.slow
 def test_a_public_name_stays_what_it_is_after_its_package_was_imported() -> None:
     code = "import tribo, tribo.cli, tribo.diagnostics, tribo.report, tribo.springblock, tribo.fitting, types\n"
     code += "print([n for n in tribo.__all__ if isinstance(getattr(tribo, n), types.ModuleType)])"
@@ -69,6 +70,7 @@ def test_three_lines_of_python_give_the_numbers_of_tribo_fit(small_campaign: Pat
 TUTORIAL = Path(__file__).resolve().parents[1] / "docs" / "tutorials" / "in-python.md"
 
 
+@pytest.mark.slow
 def test_the_fifteen_lines_of_the_tutorial_run_as_written_and_give_what_the_report_states(tmp_path: Path) -> None:
     import re
 

@@ -109,7 +109,7 @@ class MadeOnce:
         return once
 
 
-WHOLE_RUNS = ("write_report", "compare", "verify", "StudyOptions")
+WHOLE_RUNS = ("write_report", "compare", "verify", "StudyOptions", "diagnose", "Study", "Ingested", "assess")
 
 
 @pytest.fixture(scope="module")

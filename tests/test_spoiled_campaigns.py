@@ -30,6 +30,7 @@ def spoil_campaign() -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", first_quick(range(len(DIALECTS))), ids=DIALECTS)
 def test_every_kind_of_damage_is_named_in_every_dialect_and_nothing_healthy_touched(
     spoil_campaign: ModuleType, made: Callable[[str], MadeCampaign], tmp_path: Path, seed: int

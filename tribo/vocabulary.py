@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 
@@ -57,21 +58,40 @@ OBSERVABLES = {
 }  # fmt: skip
 
 
+UNIT_OF_A_NAME = re.compile(
+    r"(?P<words>.*?[A-Za-z].*?)_(?P<unit>[munk]?(?:m|s|g|N|Hz|Pa|W|J|V)|[MG]Pa|[um]?m_s|[mk]?N_per_m|h|min|rpm|pct|lb|deg)"
+)
+UNITS_READ = {"pct": "%", "deg": "°", "_per_": "/", "_": "/"}
+
+
+def described(column: str) -> ColumnWords:
+    """A recorded column; one that only this campaign has by its name, of which a unit at the end is taken off."""
+    if column in COLUMNS:
+        return COLUMNS[column]
+    ends = UNIT_OF_A_NAME.fullmatch(column)
+    if ends is None:
+        return ColumnWords(column)
+    words, unit = ends["words"].replace("_", " "), re.sub(r"^u(?=[a-zA-Z])", "µ", ends["unit"])
+    for written, read in UNITS_READ.items():
+        unit = unit.replace(written, read)
+    return ColumnWords(words, words, f"{words} ({unit})", unit)
+
+
 def in_words(column: str) -> str:
     """A recorded column in words; one that only this campaign has, by its name."""
-    return COLUMNS[column].words if column in COLUMNS else column
+    return described(column).words
 
 
 def short_label(column: str) -> str:
     """A column in a narrow table."""
-    return COLUMNS[column].short or column if column in COLUMNS else column
+    return described(column).short or column
 
 
 def axis_label(column: str) -> str:
     """A column on an axis, with its unit."""
-    return COLUMNS[column].axis or column if column in COLUMNS else column
+    return described(column).axis or column
 
 
 def label_with_unit(column: str) -> str:
     """A column in a list of columns, with its unit; one that only this campaign has, with spaces."""
-    return COLUMNS[column].label if column in COLUMNS else column.replace("_", " ")
+    return described(column).label.replace("_", " ")

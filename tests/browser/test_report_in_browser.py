@@ -169,6 +169,7 @@ def test_an_exclusion_needs_a_reason(report: Opened, tmp_path: Path) -> None:
     assert table.loc[0, ["test_id", "action", "reason"]].tolist() == ["T003", "exclude", 'he said "no", twice']
 
 
+@pytest.mark.slow
 def test_what_the_page_hands_back_is_applied_and_comes_back_on_the_next_page(
     browser: Browser, report: Opened, small_campaign: Path, out: Path, tmp_path: Path
 ) -> None:

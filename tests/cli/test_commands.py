@@ -122,6 +122,7 @@ def test_an_unusable_campaign_lists_every_fault_at_once_and_writes_nothing(spoil
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_campaign_without_a_flat_sample_is_evaluated_without_the_model(small_campaign: Path, tmp_path: Path) -> None:
     result = run("compare", small_campaign, "-o", tmp_path / "out", "--dry-run", "--flat", "B")
     assert result.exit_code == 1  # B has cavities

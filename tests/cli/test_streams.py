@@ -72,6 +72,7 @@ def test_a_path_that_is_not_utf8_is_refused_in_a_sentence(campaign: Path, tmp_pa
     assert b"Traceback" not in ended.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(getattr(os, "getuid", lambda: 1)() != 0, reason="only root can hide /proc")
 def test_tests_are_read_where_there_is_no_proc(campaign: Path, tmp_path: Path) -> None:
     command = f"mount -t tmpfs none /proc && {sys.executable} -m tribo ingest {campaign} -o {tmp_path}/out"

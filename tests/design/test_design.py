@@ -82,6 +82,7 @@ def test_designs_meet_the_target_can_be_made_and_come_with_their_campaign(tmp_pa
     assert not list(faults_of_making(pattern, Making(4e-6, 3e-6, 0.5e-6)))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 def test_a_search_that_was_stopped_ends_with_the_same_answer(tmp_path: Path):
     """To the bit, from the kept runs of its first half; and from none of them."""
@@ -94,6 +95,7 @@ def test_a_search_that_was_stopped_ends_with_the_same_answer(tmp_path: Path):
     assert one == other
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 def test_what_cannot_be_had_is_refused_with_the_nearest_and_the_limit(tmp_path: Path):
     """More static friction than the flat sample has: the status is 1, and a design is named all the same."""

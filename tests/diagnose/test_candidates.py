@@ -368,6 +368,7 @@ def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> 
     assert best_beyond_chance([pressure], chance, 0.01) is None
 
 
+@pytest.mark.slow
 def test_mechanisms_that_the_design_tells_apart_are_rivals_not_equivalent() -> None:
     """Two laws of different shape explain the campaign about equally well: the verdict stays open between them."""
     verdict = of_two_halves().verdict
@@ -376,6 +377,7 @@ def test_mechanisms_that_the_design_tells_apart_are_rivals_not_equivalent() -> N
     assert not verdict.equivalent
 
 
+@pytest.mark.slow
 def test_a_law_that_is_an_eighth_off_from_sample_to_sample_needs_no_second_cause() -> None:
     found = examine(made(suction_that_varies, seed=0, repeat_sd=(0.07, 0.05)), replicates=FEW)
     assert found.verdict.verdict == "named"

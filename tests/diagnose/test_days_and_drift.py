@@ -86,6 +86,7 @@ def test_without_days_and_drift_none_are_told(seed: int) -> None:
     assert not [x for x in diagnosed(seed, None).verdict.layers if x.kind == "nuisance"]
 
 
+@pytest.mark.slow
 def test_a_cause_beside_days_is_found_with_them() -> None:
     v = diagnosed(4, days, (("suction", 1.2),)).verdict
     assert {c.mechanism for c in v.causes} <= {"suction", "normal_load_error"}

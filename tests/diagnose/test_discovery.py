@@ -105,6 +105,7 @@ def afternoons(s: Setup) -> np.ndarray:
     return np.where(s.observations.conditions.clock_h[:, None] > 13.0, 0.2, 0.0) * np.ones(2)
 
 
+@pytest.mark.slow
 def test_an_effect_of_afternoons_is_told_as_a_step_of_the_time_of_day() -> None:
     law, *_ = discover_laws(baseline(made(afternoons, seed=5, design=DAYS)), replicates=20).laws
     assert law.law.columns == ("clock_h",)
@@ -123,6 +124,7 @@ def one_afternoon(s: Setup) -> np.ndarray:
     return afternoons(s) * 3.0 * (s.observations.conditions.elapsed_s[:, None] < 43_200.0)
 
 
+@pytest.mark.slow
 def test_one_afternoon_is_no_law_of_the_time_of_day() -> None:
     others = {"run_order", "specimen_run", "elapsed_s", "date"}
     found = discover_laws(baseline(made(one_afternoon, seed=5, design=DAYS)), replicates=20, without=others)

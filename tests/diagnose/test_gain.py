@@ -21,6 +21,7 @@ FLAT = Design(samples=("F",), specimens=10, masses_g=(5.0, 25.0, 90.0, 138.5))
 SPECIMEN_SD, REPEAT_SD = 0.25, 0.03
 
 
+@pytest.mark.slow
 def test_specimens_left_out_score_as_the_density_they_were_drawn_from() -> None:
     """A new specimen differs by 25 % from the last, its repeats by 3 %; the density has to allow for both."""
 

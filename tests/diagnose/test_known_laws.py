@@ -136,6 +136,7 @@ def test_a_cause_that_follows_one_name_of_a_column_loses_against_a_law_of_that_n
     assert set(without_refuted_causes(refitted(baseline(patterned), one_name))[1]) == {"covariate:operator"}
 
 
+@pytest.mark.slow
 def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its_cause() -> None:
     def film_of(test_id: str) -> float:
         return 1.0 + 0.05 * (37 * int(test_id[1:]) % 101)

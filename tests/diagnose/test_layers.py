@@ -88,6 +88,7 @@ def test_the_size_of_a_cause_beside_a_remainder_is_that_which_was_hidden(beside:
     assert layer.gain.difference > 0
 
 
+@pytest.mark.slow
 def test_a_wave_alone_is_a_remainder_and_no_cause() -> None:
     v = examine(made(wave, seed=2), replicates=FEW).verdict
     assert v.verdict == "unknown"

@@ -41,6 +41,7 @@ def test_the_value_that_is_off_is_named_and_no_other_cause_beside_what_cannot_be
     assert all({NAMES[kind], name} <= set(v.equivalent[0]) for name in right if name != NAMES[kind])
 
 
+@pytest.mark.slow
 def test_a_lot_that_moves_its_specimens_is_named_although_it_spreads_them() -> None:
     """Specimens seem to scatter by as much as the lots differ; what they scatter beside the lots is what counts."""
     made = make(4, PATTERNS_OFF, hide=hide_one_value(4, PATTERNS_OFF, "lot"))
@@ -54,6 +55,7 @@ def test_the_remedy_says_which_weight_to_weigh() -> None:
     assert v.causes[0].text.endswith(f"Weigh the {value.removesuffix('.0')} g weight.")
 
 
+@pytest.mark.slow
 def test_with_patterns_off_and_nothing_hidden_no_value_is_named() -> None:
     made = make(6, PATTERNS_OFF)
     assert examine(handed_over(made.bench, 6), seed=6, replicates=(40, 20)).verdict.causes == ()

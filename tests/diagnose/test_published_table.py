@@ -91,6 +91,7 @@ def test_a_mechanism_put_into_the_table_is_found_again_with_its_size(name: str) 
     assert f.score > fit_table(again).score + 2
 
 
+@pytest.mark.slow
 def test_whether_the_papers_model_fails_hangs_on_the_correlation_and_on_what_the_deviations_are_of(
     whole: PublishedDiagnosis,
 ) -> None:
@@ -104,6 +105,7 @@ def test_whether_the_papers_model_fails_hangs_on_the_correlation_and_on_what_the
         assert of_mean[model, 0.0] > 0.01
 
 
+@pytest.mark.slow
 def test_suction_is_excluded_in_every_reading_and_deformed_patterns_are_not(whole: PublishedDiagnosis) -> None:
     for o in whole.results:
         gains = {w.name: w.gain for w in o.weighed}
@@ -115,6 +117,7 @@ def test_suction_is_excluded_in_every_reading_and_deformed_patterns_are_not(whol
     assert upper_limit(whole.main.baseline, "suction") < 2000.0
 
 
+@pytest.mark.slow
 def test_the_verdict_says_what_holds_of_each_guess_and_accounts_for_every_mechanism(whole: PublishedDiagnosis) -> None:
     v = worded(whole.verdict)
     assert all(word in v.text for word in ("Deformed patterns", "contact area", "Suction cups", "covariance"))
@@ -126,6 +129,7 @@ def test_the_verdict_says_what_holds_of_each_guess_and_accounts_for_every_mechan
     assert [r["outcome"] for r in told] == [o.outcome for o in whole.results]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(PUBLISHED_FIGURES))
 def test_the_figures_of_the_table_are_drawn_from_their_numbers(name: str, whole: PublishedDiagnosis) -> None:
     numbers = PUBLISHED_FIGURES[name].numbers(whole)

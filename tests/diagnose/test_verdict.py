@@ -107,6 +107,7 @@ def test_no_difference_tells_nothing_and_a_large_one_tells_all() -> None:
     assert bits(400.0) == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_batch_that_grips_more_is_named_by_its_column() -> None:
     ingested = hidden(seed=21)
     batches = {t.test_id: "abc"[k % 3] for k, t in enumerate(ingested.campaign.tests)}
@@ -149,6 +150,7 @@ def one_pattern_falls() -> Verdict:
     return worded(examine(replace(ingested, pulls=pulls), replicates=FEW).verdict)
 
 
+@pytest.mark.slow
 def test_a_misfit_is_said_in_words_of_the_field_and_not_of_the_flat_sample(tied: Diagnosis) -> None:
     found = [*tied.verdict.misfits, *one_pattern_falls().misfits]
     assert any("of C falls with the normal load" in m.text for m in found)

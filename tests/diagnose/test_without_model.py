@@ -22,6 +22,7 @@ from tribo.diagnostics.verdict import Cause, Verdict
 from tribo.fitting.alternatives import compared_laws, dependence
 from tribo.plausibility import doubts_of
 from tribo.records import Campaign, Ingested, Pattern, Pull, Study, Test, Trace
+from tribo.vocabulary import label_with_unit
 from tribo.wording.part_sentences import cause_sentence, layer_sentence
 from tribo.wording.verdict_sentences import meanings
 
@@ -128,7 +129,7 @@ def test_columns_that_run_alike_are_named_as_tied_with_the_test_that_parts_them(
     assert {frozenset(names) for names in found.equivalent} == {frozenset({"covariate:run_order", "covariate:wear_m"})}
     assert found.next_test is not None
     assert set(found.next_test.separates) == {"run_order", "wear_m"}
-    assert found.next_test.text == "Choose the values of wear_m at random, independently of the run order: 12 pulls."
+    assert found.next_test.text == "Choose the values of wear at random, independently of the run order: 12 pulls."
 
 
 def test_a_column_that_varies_only_with_the_load_cannot_be_told_from_it(tmp_path: Path) -> None:
@@ -248,3 +249,12 @@ def test_running_in_within_records_is_not_explained_as_a_matter_of_first_pulls()
         "Within one record, friction changes with the distance."
     ]
     assert "first pulls" in meanings(over_pulls)[0][1]
+
+
+@pytest.mark.parametrize(
+    ("column", "label"),
+    [("radius_mm", "radius (mm)"), ("slide_speed_um_s", "slide speed (µm/s)"), ("spring_N_per_m", "spring (N/m)"),
+     ("cure_time_h", "cure time (h)"), ("rh_pct", "rh (%)"), ("SequenceID", "SequenceID"), ("speed_mm_s", "pull speed (mm/s)")],
+)  # fmt: skip
+def test_a_users_own_column_is_named_with_the_unit_that_ends_its_name(column: str, label: str) -> None:
+    assert label_with_unit(column) == label

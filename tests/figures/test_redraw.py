@@ -40,6 +40,7 @@ def test_numbers_read_from_the_file_beside_a_figure_draw_the_same(name: str, stu
     assert len(first) == pytest.approx(len(second), rel=0.01)
 
 
+@pytest.mark.slow
 def test_figures_of_a_folder_have_text_that_can_be_edited_and_other_names(small_report: Path, tmp_path: Path) -> None:
     (tmp_path / "figures").mkdir()
     for name in ("fig4", "fig6", "agreement"):

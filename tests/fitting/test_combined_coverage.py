@@ -36,6 +36,7 @@ def test_combined_intervals_hold_the_law_and_those_of_lucky_specimens_too(benchm
     assert found.loc[("alike by luck", "combined"), "T_N"] > 80
 
 
+@pytest.mark.slow
 def test_without_the_other_samples_lucky_specimens_are_believed_too_much(benchmark: ModuleType) -> None:
     alone, pooled = (
         benchmark.coverage("standard", "precise", 25, 5, dof).set_index(["samples", "interval"])["T_N"]

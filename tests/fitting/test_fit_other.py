@@ -41,6 +41,7 @@ def test_the_three_term_law_counts_a_specimen_pulled_both_ways_once() -> None:
     assert fit.n_tests == 6 * 3 * 18
 
 
+@pytest.mark.slow
 def test_the_three_term_covariance_is_the_scatter_over_repeated_campaigns() -> None:
     fits = [
         fit_three_term(pulls(between=0.05, within=0.07, seed=s), "static", AREA, AREA_FRACTIONS) for s in range(150)
@@ -67,6 +68,7 @@ def test_too_few_specimens_for_the_jackknife_are_refused() -> None:
         fit_three_term(pulls(specimens=1).query("sample in ['F', 'B', 'C']"), "static", AREA, AREA_FRACTIONS)
 
 
+@pytest.mark.slow
 def test_the_mixed_model_agrees_with_the_specimens_mean_on_balanced_data_where_it_converges() -> None:
     from tribo.fitting import fit_samples
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -40,6 +42,21 @@ def test_a_pull_twice_as_high_as_its_siblings_is_found_by_its_id() -> None:
     assert "T100" in outlying_sentences(found)[0]
 
 
+def test_pulls_of_a_power_of_the_load_are_not_outliers_of_a_line() -> None:
+    table = campaign(3)
+    table["static_N"] *= 3.0 * table["normal_load_N"] ** 0.5 / (4.0 * table["normal_load_N"] + 15e3 * AREA)
+    assert outlying_pulls(table, "static", AREA, dict.fromkeys("ABCDEF", 0.5)).empty
+
+
+def test_many_outliers_of_one_sample_are_one_sentence() -> None:
+    table = campaign(3)
+    table.loc[range(54, 103, 7), "static_N"] *= 2
+    found = outlying_pulls(table, "static", AREA)
+    (sentence,) = outlying_sentences(found)
+    assert len(found) == 7
+    assert re.match(r"7 pulls \(B, static\): \d+ to \d+ % above the law of their specimen, ", sentence)
+
+
 def test_a_specimen_far_above_the_others_is_found_once_and_stays_in_the_fit() -> None:
     table = campaign(4)
     table.loc[table["specimen"] == "C1", "static_N"] *= 1.8
@@ -49,6 +66,7 @@ def test_a_specimen_far_above_the_others_is_found_once_and_stays_in_the_fit() ->
     assert set(fit.specimens) == {"C0", "C1", "C2"}
 
 
+@pytest.mark.slow
 def test_campaigns_without_outliers_are_mostly_left_alone() -> None:
     alarms = [len(outlying_pulls(campaign(seed), "static", AREA)) > 0 for seed in range(30)]
     specimens = [len(outlying_specimens(campaign(seed), "static", AREA)) > 0 for seed in range(30)]

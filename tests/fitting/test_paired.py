@@ -43,6 +43,7 @@ def test_the_difference_is_known_better_than_by_two_samples_of_their_own_specime
     assert (found["u"] / found["unpaired_u"]).median() < 0.5
 
 
+@pytest.mark.slow
 def test_95_percent_intervals_of_the_difference_hold_it() -> None:
     truth = {"mu": 0.3, "tau0_kPa": 1.0, "T_N": (0.3 * 10e3 + 1e3) * AREA_M2}
     found = pd.concat([differences(1000 + seed) for seed in range(300)])

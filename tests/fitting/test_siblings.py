@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -118,3 +119,17 @@ def test_forces_that_follow_a_power_of_the_load_are_no_slips(ingested: Ingested)
     assert sibling_doubts(powers) == ()
     (doubt,) = sibling_doubts(times(powers, {tests[-1].test_id: 0.5}))
     assert f"test {tests[-1].test_id} " in doubt.name
+
+
+def test_many_pulls_of_one_sample_that_lie_low_are_one_doubt_with_the_column_they_share() -> None:
+    whole = tribo.load_campaign(tribo.data_dir() / "example")
+    of_sample = [t.test_id for t in whole.tests if t.sample == "B"]
+    first = np.random.default_rng(0).permutation(of_sample)[:8].tolist()
+    tests = tuple(replace(t, covariates={"cycle": str(2 - (t.test_id in first))}) for t in whole.tests)
+    many = tribo.ingest(replace(whole, tests=tests))
+    doubt, *others = sibling_doubts(times(many, dict(zip(first, np.linspace(0.2, 0.4, len(first)), strict=True))))
+    assert not others
+    assert set(doubt.tests) == set(first)
+    assert "friction of 8 tests of B" in doubt.name
+    assert "all of cycle 1" in doubt.place
+    assert re.fullmatch(r"(5\d|6\d) % to [45](\.\d)? times below that of siblings", doubt.found)  # 60 % to 5 times

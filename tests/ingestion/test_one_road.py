@@ -239,6 +239,7 @@ def test_a_pull_is_made_in_one_module_only() -> None:
     assert makers == {"traces/evaluation.py"}
 
 
+@pytest.mark.slow
 def test_the_old_name_of_a_rule_is_taken_and_the_new_one_said_once(tmp_path: Path) -> None:
     found = ingested(tmp_path / "c", strokes(), {"T1": "#*"}, normal_load_N=4.5)
     with pytest.warns(FutureWarning, match="now called first_peak") as said:

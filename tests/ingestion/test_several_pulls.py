@@ -222,6 +222,7 @@ def test_a_plan_needs_the_loads_in_its_table(tmp_path: Path) -> None:
     assert [p.kind for p in aside.problems] == ["no_load"]
 
 
+@pytest.mark.slow
 def test_the_command_fits_a_log_of_strokes(tmp_path: Path) -> None:
     campaign, out = tmp_path / "campaign", tmp_path / "out"
     campaign.mkdir()

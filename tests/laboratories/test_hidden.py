@@ -32,6 +32,7 @@ def test_a_form_is_off_by_a_function_of_the_column_that_drives_it(name: str) -> 
     assert len(np.unique(g.round(9))) <= len(np.unique(column))
 
 
+@pytest.mark.slow
 def test_nuisance_weakens_what_the_observer_sees_of_an_effect() -> None:
     hide, rng = hide_effect("temperature", 1.0), stream(23, HIDDEN)
     free = strengths(23, SMALL, (), hide, rng)
@@ -40,6 +41,7 @@ def test_nuisance_weakens_what_the_observer_sees_of_an_effect() -> None:
     assert under["patterns_known"] < 0.95 * free["patterns_known"]
 
 
+@pytest.mark.slow
 def test_the_observer_needs_the_patterns_to_see_suction_but_not_to_see_an_offset() -> None:
     suction = strengths(24, SMALL, (), hide_effect("suction", 1.0), stream(24, HIDDEN))
     assert suction["patterns_known"] > 3 * suction["strength"]

@@ -298,7 +298,7 @@ MISTAKES = (
             each_row(lambda row: {"humidity_pct": "480"}), "humidity_pct", "0 to 100", DOUBTED),
     Mistake("one mass ten times too large",
             each_row(lambda row: {"mass_g": f"{float(row['mass_g']) * 10:g}"}, 4, 5),
-            "T005", "another load", DOUBTED, True),
+            "T005", "a decimal point in the load", DOUBTED, True),
     # raw/ again
     Mistake("exports of the next row", _exports_of_the_next_row, "column file", "may be exchanged", DOUBTED),
     Mistake("a force that acts backwards", recorded(2, lambda x: -x), "T001.csv, column force",

@@ -187,6 +187,7 @@ def touched(before: dict[str, bytes], after: dict[str, bytes]) -> set[str]:
     return {m.group(1) for m in found if m}
 
 
+@pytest.mark.slow
 def test_a_killed_build_leaves_whole_files_only(story: Story) -> None:
     assert 0 < len(records_in(story.killed)) < 4
     for name, content in story.killed.items():
@@ -194,6 +195,7 @@ def test_a_killed_build_leaves_whole_files_only(story: Story) -> None:
             json.loads(content)
 
 
+@pytest.mark.slow
 def test_the_next_build_goes_on_where_the_killed_one_stopped(story: Story) -> None:
     assert story.resumed.status == 0
     kept = records_in(story.killed)
@@ -204,6 +206,7 @@ def test_the_next_build_goes_on_where_the_killed_one_stopped(story: Story) -> No
     assert {f".tribo/steps/{job.group(2)}/{job.group(1)}.json" for job in jobs if job} & kept == again
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", "ab")
 def test_every_campaign_has_its_report_and_a_place_in_the_index(story: Story, name: str) -> None:
     latest = story.lab.site / "latest"
@@ -211,17 +214,20 @@ def test_every_campaign_has_its_report_and_a_place_in_the_index(story: Story, na
     assert f'href="{name}/report.html"' in (latest / "index.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_of_two_starts_at_once_one_leaves_and_says_why(story: Story) -> None:
     assert story.refused.returncode == 75
     assert "another build of this site is running" in story.refused.stderr
 
 
+@pytest.mark.slow
 def test_a_start_that_waits_finds_nothing_left_to_do(story: Story) -> None:
     assert (story.idle.status, story.idle.said["steps"], story.idle.said["due"]) == (0, [], {})
     assert story.idle.after == story.resumed.after
     assert story.idle.said["dated"] is None
 
 
+@pytest.mark.slow
 def test_only_campaigns_whose_exports_changed_or_went_are_built_again(story: Story) -> None:
     assert set(story.mixed.said["due"]) == {"a"}
     why = r"changed raw/T\d+.csv, tests.csv; removed raw/T\d+.csv"
@@ -229,6 +235,7 @@ def test_only_campaigns_whose_exports_changed_or_went_are_built_again(story: Sto
     assert touched(story.idle.after, story.mixed.after) == {"a"}
 
 
+@pytest.mark.slow
 def test_a_half_copied_export_is_left_for_the_next_round_and_named(story: Story) -> None:
     assert story.mixed.status == 3
     assert story.mixed.said["waiting"] == {"b": ["raw/T009.csv.part is being uploaded"]}
@@ -237,12 +244,14 @@ def test_a_half_copied_export_is_left_for_the_next_round_and_named(story: Story)
     assert "raw/T009.csv.part is being uploaded" in index
 
 
+@pytest.mark.slow
 def test_a_changed_export_of_a_pattern_runs_no_simulation_again(story: Story) -> None:
     cells = [name for name in story.idle.after if re.search(r"current/a/kept/.*(\.nc|calibration.json)$", name)]
     assert len(cells) == 5
     assert all(story.idle.after[name] == story.mixed.after[name] for name in cells)
 
 
+@pytest.mark.slow
 def test_an_added_export_builds_its_campaign_and_no_other(story: Story) -> None:
     assert story.added.status == 0
     assert story.added.said["due"] == {"b": "changed tests.csv; added raw/T009.csv"}
@@ -250,20 +259,24 @@ def test_an_added_export_builds_its_campaign_and_no_other(story: Story) -> None:
     assert b"T009" in story.added.after["current/b/tests.csv"]
 
 
+@pytest.mark.slow
 def test_new_dates_on_the_same_contents_build_nothing(story: Story) -> None:
     assert (story.again.said["steps"], story.again.after) == ([], story.added.after)
 
 
+@pytest.mark.slow
 def test_a_dry_run_with_nothing_to_do_names_no_step(story: Story) -> None:
     assert (story.nothing.said["steps"], story.nothing.said["due"]) == ([], {})
 
 
+@pytest.mark.slow
 def test_a_report_that_was_deleted_is_made_again_from_what_is_there(story: Story) -> None:
     assert story.restored.said["due"] == {"a": "report.html has been deleted"}
     assert [step.split(":")[0] for step in story.restored.said["steps"]] == ["report (a)", "index"]
     assert "current/a/report.html" in story.restored.after
 
 
+@pytest.mark.slow
 def test_each_build_that_changed_something_is_kept_by_its_date(story: Story) -> None:
     made = [Path(r.said["dated"]) for r in (story.resumed, story.mixed, story.added, story.restored)]
     assert sorted(p.name for p in (story.lab.site / "builds").iterdir()) == [p.name for p in made]

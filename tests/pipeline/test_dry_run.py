@@ -44,6 +44,7 @@ def test_an_unknown_rule_is_refused_once_and_at_once(tmp_path: Path) -> None:
     assert result.output.count("did you mean iso_8295?") == 1
 
 
+@pytest.mark.slow
 def test_a_workflow_that_cannot_run_gives_status_1(tmp_path: Path) -> None:
     age(small(tmp_path / "drop" / "good", 1))
     (tmp_path / "profile").mkdir()

@@ -49,6 +49,7 @@ def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
     assert set(drawn) == {"fig4", "fig6", "dependence", "forces"}  # no other one shows the static force of a pull
 
 
+@pytest.mark.slow
 def test_several_processes_draw_the_same_bytes(measured: Study, kept: Kept) -> None:
     one, two = kept.figures, draw_all(measured, jobs=2)
     assert list(one) == list(two)

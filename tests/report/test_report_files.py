@@ -32,6 +32,7 @@ def test_out_holds_the_agreed_files(written: Written) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", first_quick(["measured", "study"]))
 def test_the_same_study_gives_the_same_bytes(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     first, again = tmp_path / "first", tmp_path / "again"
@@ -42,6 +43,7 @@ def test_the_same_study_gives_the_same_bytes(name: str, request: pytest.FixtureR
     assert not [name for name in names if (first / name).read_bytes() != (again / name).read_bytes()]
 
 
+@pytest.mark.slow
 def test_a_file_that_takes_over_earlier_groups_has_the_same_bytes(study: Study, tmp_path: Path) -> None:
     write_store(study, tmp_path)
     first = (tmp_path / "campaign.nc").read_bytes()

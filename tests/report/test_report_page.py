@@ -105,6 +105,7 @@ def test_every_pull_and_every_test_set_aside_is_on_the_page(page: str, study: St
     assert page.count('class="trace"') == len(study.ingested.traces)
 
 
+@pytest.mark.slow
 def test_the_page_draws_its_figures_itself_where_none_are_given(measured: Study, page: str) -> None:
     drawn = html(measured).count("<figure")
     assert drawn == 8  # with T and T/N against load, and every test, of a report without the model

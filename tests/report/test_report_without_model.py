@@ -41,6 +41,7 @@ def report(folder: Path, out: Path, *options: str) -> str:
     return (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_campaign_of_flat_samples_is_reported_without_the_model(tmp_path: Path) -> None:
     page = report(write(tmp_path / "c", (1.0, 2.0, 4.0, 8.0), "nominal_area_mm2 = 55.0"), tmp_path / "out")
     assert "Friction and what it varies with" in page
@@ -58,6 +59,7 @@ def test_a_campaign_of_flat_samples_is_reported_without_the_model(tmp_path: Path
     assert [rows[name] for name in unsaid] == ["not recorded"] * 4
 
 
+@pytest.mark.slow
 def test_without_a_nominal_area_the_intercept_is_a_force(tmp_path: Path) -> None:
     page = report(write(tmp_path / "c", (1.0, 2.0, 4.0, 8.0)), tmp_path / "out")
     assert "T₀ (N)" in page
@@ -80,6 +82,7 @@ def test_one_load_has_no_law_over_load_but_what_it_varies_with(tmp_path: Path) -
     assert found.loc[("sliding", "run_order"), "p_adjusted"] < 0.01
 
 
+@pytest.mark.slow
 def test_the_model_is_left_out_by_choice(tmp_path: Path) -> None:
     folder = write(tmp_path / "c", (1.0, 2.0, 4.0, 8.0), "nominal_area_mm2 = 55.0")
     text = (folder / "campaign.toml").read_text()

@@ -124,6 +124,7 @@ def test_loops_over_all_blocks_use_vector_instructions(loop):
     assert re.search(wanted, assembly)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instructions")
 def test_loops_over_strips_use_vector_instructions():
     """Forces and gliding without a square root, sliding with it; each compiled by itself."""

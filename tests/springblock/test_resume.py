@@ -132,6 +132,7 @@ def test_a_store_of_another_version_is_not_continued(tmp_path: Path):
         run_stored(design(1), tmp_path / "e.h5")
 
 
+@pytest.mark.slow
 def test_no_flipped_bit_of_a_store_gives_another_number_in_silence(tmp_path: Path):
     """A table with a flipped bit is the same, or is refused."""
     path = tmp_path / "e.h5"
@@ -178,6 +179,7 @@ def test_two_processes_do_not_write_one_store(tmp_path: Path):
     assert [path.name for path in tmp_path.iterdir()] == ["e.h5"]
 
 
+@pytest.mark.slow
 def test_a_command_that_is_asked_to_end_leaves_whole_files_only(tmp_path: Path):
     """SIGTERM ends an ensemble as Ctrl-C does: status 130, no lock, no half file, and the next start goes on."""
     store = tmp_path / "e.nc"

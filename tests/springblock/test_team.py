@@ -21,6 +21,7 @@ def run(threads: int) -> Trajectory:
     return run_fast(CONFIG, lattice, thresholds_of(CONFIG, lattice), threads)
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch):
     """To the bit, with one thread and with three; seed 4."""
     monkeypatch.setattr(team, "FEWEST_BLOCKS", 1000)

@@ -65,6 +65,7 @@ def test_a_slow_recorder_tells_no_mass_and_bounds_sliding_friction():
     assert found["stiffness_N_per_m"].value == pytest.approx(170.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_growth_at_rest_is_not_told_by_slips_of_equal_hold_and_coulomb_is_not_beaten():
     time, force = record(5, 1000.0)
     coulomb, ageing = (fit_slips(time, force, law, 0.3, 1e-3) for law in ("coulomb", "ageing"))

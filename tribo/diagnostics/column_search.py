@@ -497,14 +497,21 @@ def _ends(column: Regressor, size: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def most_scattered(ingested: Ingested) -> RepeatScatter | None:
-    """The repeats that scatter most: tests of one sample at one load, speed and hold; None where nothing was repeated.
+    """The repeats that scatter most: tests of one sample at one load and equal settings; None where there are none.
+
+    Settings are speed, hold, stiffness, and further columns in which several tests share each of the values.
     """
     tests = [t for t in ingested.campaign.tests if t.test_id in ingested.pulls and t.normal_load_N > 0]
+    further = {name: [t.covariates.get(name, "") for t in tests] for name in tests[0].covariates} if tests else {}
+    set_on_purpose = [name for name, values in further.items() if 2 * len(set(values)) <= len(values)]
     found = []
     for sample in dict.fromkeys(t.sample for t in tests):
         of_sample = [t for t in tests if t.sample == sample]
         levels = load_levels(np.array([t.normal_load_N for t in of_sample]))
-        kinds = [(int(level), t.speed_m_s, t.hold_s) for level, t in zip(levels, of_sample, strict=True)]
+        kinds = [
+            (int(level), t.speed_m_s, t.hold_s, t.stiffness_N_per_m, *map(t.covariates.get, set_on_purpose))
+            for level, t in zip(levels, of_sample, strict=True)
+        ]
         for kind in dict.fromkeys(kinds):
             repeats = [t for t, own in zip(of_sample, kinds, strict=True) if own == kind]
             load = float(np.median([t.normal_load_N for t in repeats]))

@@ -14,8 +14,9 @@ specimens and of repeats is pooled over the samples of the campaign: three speci
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -225,20 +226,22 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
     parts = [budget.assign(sample=fit.sample, regime=fit.regime) for fit, budget in budgets]
     power: list[str] = []
     outlying: list[str] = []
+    laws = compared_laws(table)
     for regime in REGIMES:
         if area is not None:
             with suppress(FitError):
                 power += power_sentences(power_of_campaign(table, regime, area, weights=weights))
-        for search in (outlying_pulls, outlying_specimens):
-            with suppress(FitError):
-                outlying += outlying_sentences(search(table, regime, area))
+        with suppress(FitError):
+            outlying += outlying_sentences(outlying_pulls(table, regime, area, exponents_of(laws, regime)))
+        with suppress(FitError):
+            outlying += outlying_sentences(outlying_specimens(table, regime, area))
     paired = paired_differences(fits)
     return {
         "other_fits": _other_fits(ingested, fits, weights),
         "budget": pd.concat(parts, ignore_index=True) if parts else None,
         "power": tuple(power),
         "outlying": tuple(outlying),
-        "laws": compared_laws(table),
+        "laws": laws,
         "dependence": dependence(ingested),
         "differences": paired if len(paired) else None,
     }
@@ -281,26 +284,52 @@ def power_sentences(power: pd.DataFrame) -> list[str]:
 OUTLYING = ["kind", "name", "sample", "regime", "deviation_pct", "score", "limit"]
 
 
+MOST_ALONE = 5  # sentences about single pulls of one sample; more are told together
+
+
 def outlying_sentences(outlying: pd.DataFrame) -> list[str]:
-    """What :func:`outlying_pulls` or :func:`outlying_specimens` found, a sentence each."""
-    siblings = {"pull": "the line of its specimen", "specimen": "the other specimens of its sample"}
-    return [
-        f"{o['kind']} {o['name']} ({o['sample']}, {o['regime']}): {abs(o['deviation_pct']):.0f} % "
-        f"{'above' if o['deviation_pct'] > 0 else 'below'} {siblings[o['kind']]}, {o['score']:.1f} robust standard "
-        f"deviations (limit {o['limit']:.1f})"
-        for o in outlying.to_dict("records")
-    ]
+    """What :func:`outlying_pulls` or :func:`outlying_specimens` found, a sentence each; many of one sample in one."""
+    siblings = {"pull": "the law of {} specimen", "specimen": "the other specimens of {} sample"}
+    ways = outlying.assign(way=["above" if d > 0 else "below" for d in outlying["deviation_pct"]])
+    found = []
+    for (kind, sample, regime, way), rows in ways.groupby(["kind", "sample", "regime", "way"], sort=False):
+        beside, limit = siblings[str(kind)], f"(limit {rows['limit'].iloc[0]:.1f})"
+        size = rows["deviation_pct"].abs()
+        if len(rows) > MOST_ALONE:
+            found.append(
+                f"{len(rows)} {kind}s ({sample}, {regime}): {size.min():.0f} to {size.max():.0f} % {way} "
+                f"{beside.format('their')}, up to {rows['score'].max():.1f} robust standard deviations {limit}: "
+                f"{', '.join(rows['name'][:MOST_ALONE])} and {len(rows) - MOST_ALONE} more"
+            )
+            continue
+        found += [
+            f"{kind} {name} ({sample}, {regime}): {deviation:.0f} % {way} {beside.format('its')}, {score:.1f} robust "
+            f"standard deviations {limit}"
+            for name, deviation, score in zip(rows["name"], size, rows["score"], strict=True)
+        ]
+    return found
 
 
-def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None) -> pd.DataFrame:
+def exponents_of(laws: pd.DataFrame, regime: Regime) -> dict[str, float]:
+    """The exponent of each sample whose chosen law is a power of the load; of :func:`tribo.fitting.compared_laws`."""
+    powers = laws[laws["chosen"] & (laws["regime"] == regime) & (laws["law"] == "power")]
+    return dict(zip(powers["sample"], powers["b"], strict=True))
+
+
+def outlying_pulls(
+    table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None, exponents: Mapping[str, float] | None = None
+) -> pd.DataFrame:
     """Pulls far from the robust line (Tukey's biweight) of their specimen, one row each, furthest first.
 
     ``name`` is the test_id, ``deviation_pct`` that of T from the line, ``score`` the same in robust standard
     deviations, and ``limit`` the score that chance exceeds in 5 % of campaigns, all comparisons counted. Deviations are
     judged against the scatter of repeats as a function of force (:mod:`tribo.fitting.linear`), the same for all
-    samples. Specimens with fewer than five pulls are skipped: they determine no line.
+    samples. Specimens with fewer than five pulls are skipped: they determine no line. A sample in ``exponents`` follows
+    a power of the load: its line is one over the load to that power.
     """
     samples = [rows for rows in sample_rows(table, regime) if len(np.unique(rows.load_N)) > 1]
+    powers = exponents or {}
+    samples = [replace(rows, load_N=rows.load_N ** powers.get(rows.sample, 1.0)) for rows in samples]
     scatter = repeat_scatter(tuple(samples)) if samples else None
     lines = []
     for rows in samples:

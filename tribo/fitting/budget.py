@@ -42,6 +42,11 @@ DEFAULTS: dict[str, tuple[float, str]] = {  # used where campaign.toml gives non
     "wire_angle_deg": (0.0, "wire assumed to be horizontal"),
     "wire_angle_u_deg": (0.5, "as for a wire levelled by eye; state 0 where no wire pulls"),
 }
+DEFAULTS_WITHOUT_MASSES = DEFAULTS | {  # of a rig that records or states its load as a force
+    "mass_u_g": (0.0, "no test states a mass"),
+    "normal_load_u_percent": (0.58, "class 1 of ISO 7500-1: limits ±1 %, rectangular distribution"),
+    "wire_angle_u_deg": (0.0, "no test states a mass, as a sled on a wire has one"),
+}
 
 
 def combined_fits(ingested: Ingested, fits: tuple[LawFit, ...], *, weights: str = "relative") -> Fits:
@@ -81,6 +86,7 @@ def campaign_budgets(
         if (pull := ingested.pulls.get(test.test_id)) is not None and np.isfinite(pull.rise_N_per_s):
             rises.setdefault(test.sample, []).append(pull.rise_N_per_s)
     rise = {sample: float(np.median(values)) for sample, values in rises.items()}
+    defaults = DEFAULTS if any(test.mass_kg for test in campaign.tests) else DEFAULTS_WITHOUT_MASSES
     found = []
     for regime in dict.fromkeys(fit.regime for fit in usable):
         rows = {r.sample: r for r in sample_rows(table, regime)}
@@ -92,7 +98,7 @@ def campaign_budgets(
             found.append(
                 uncertainty_budget(
                     table, fit, campaign.instrument, weights=weights, sampling_rate_Hz=stated, load_N=load_N,
-                    rise_N_per_s=rise.get(fit.sample, float("nan")),
+                    rise_N_per_s=rise.get(fit.sample, float("nan")), defaults=defaults,
                 )
             )  # fmt: skip
     return tuple(found)
@@ -107,6 +113,7 @@ def uncertainty_budget(
     rise_N_per_s: float = float("nan"),
     sampling_rate_Hz: float = float("nan"),
     load_N: float | None = None,
+    defaults: Mapping[str, tuple[float, str]] = DEFAULTS,
 ) -> tuple[LawFit, pd.DataFrame]:
     """One fit of ``fit_samples(table, ..., weights=weights)`` with its combined uncertainty, and the budget of that.
 
@@ -114,12 +121,13 @@ def uncertainty_budget(
     ----------
     table : that of ``Ingested.table()``
     fit : the fitted law; its covariance is the type A part
-    instrument : settings of campaign.toml (standard uncertainties, k = 1); what it lacks is taken from ``DEFAULTS``
+    instrument : settings of campaign.toml (standard uncertainties, k = 1); what it lacks is taken from ``defaults``
     weights : of the fit
     rise_N_per_s, sampling_rate_Hz : slope of the force before the peak, and f_s
         Together the sampling clip of static friction: a peak between two samples is read low by up to
         rise/(2 f_s) = k v/(2 f_s), taken as rectangular about zero because it is not corrected.
     load_N : where T is judged; a pressure of 10 kPa where it is not given
+    defaults : a value and its reason for each setting of the instrument
 
     Returns
     -------
@@ -148,7 +156,7 @@ def uncertainty_budget(
         load_N = PRESSURE_PA * fit.nominal_area_m2 if fit.nominal_area_m2 else float(np.median(rows.load_N))
     by = sensitivities(fit, load_N)
     rows_a, notes = _type_a(rows, fit, weights, by)
-    changes = _type_b(fit, instrument, rise_N_per_s, sampling_rate_Hz)
+    changes = _type_b(fit, instrument, defaults, rise_N_per_s, sampling_rate_Hz)
     if fit.regime == "static" and not np.isfinite(rise_N_per_s * sampling_rate_Hz):
         notes += ("component sampling clip left out: the rise before the peak or the sampling rate is not known",)
     rows_b = [
@@ -237,12 +245,13 @@ def _within(rows: Rows, fit: LawFit, weights: str) -> tuple[FloatArray, FloatArr
 
 
 def _type_b(
-    fit: LawFit, instrument: Mapping[str, float], rise_N_per_s: float, sampling_rate_Hz: float
+    fit: LawFit, instrument: Mapping[str, float], defaults: Mapping[str, tuple[float, str]], rise_N_per_s: float,
+    sampling_rate_Hz: float,
 ) -> list[tuple[str, FloatArray, str]]:
     """(name, change (2,) of the parameters by one standard uncertainty, origin) of what all pulls share."""
     mu, adhesion = fit.values
     area = fit.nominal_area_m2
-    settings = {name: float(instrument.get(name, value)) for name, (value, _) in DEFAULTS.items()}
+    settings = {name: float(instrument.get(name, value)) for name, (value, _) in defaults.items()}
     gain, as_adhesion = np.array([mu, adhesion]), np.array([0.0, 1.0 if area is None else 1 / area])
     mass_N = settings["mass_u_g"] * 1e-3 * STANDARD_GRAVITY
     settings["area_u_percent"] *= fit.has_area
@@ -260,7 +269,7 @@ def _type_b(
         ("nominal area", np.array([0.0, adhesion]) * settings["area_u_percent"] / 100, "area_u_percent"),
         ("wire angle", gain * wire, "wire_angle_u_deg"),
     ):
-        value, reason = DEFAULTS[setting]
+        value, reason = defaults[setting]
         stated = f"campaign.toml: {setting} = {instrument[setting]:g}" if setting in instrument else ""
         changes.append((name, change, stated or f"default {setting} = {value:g}: {reason}"))
     low_N = rise_N_per_s / (2 * sampling_rate_Hz)

@@ -11,10 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from tribo.fits import REGIMES
 from tribo.fitting.linear import levels_of
 from tribo.records import Campaign, Doubt, FloatArray, Ingested
+
+BoolArray = NDArray[np.bool_]
 
 CHANCE = 0.005  # of naming any pull of one regime in a campaign whose repeats scatter with the tails below
 TAILS = 6.0  # degrees of freedom of Student's t for the scatter of repeats: one in a thousand is 6 deviations off
@@ -25,6 +28,8 @@ FEWEST_SPLIT, LEAST_SPLIT = 3, 0.25  # cells, and the share of all, that a slip 
 LOADS_APART = 0.1  # by which two loads differ, as ln, at the least: the line of loads that are alike leads anywhere
 FEWEST_LEVELS = 3  # of load, beyond which a power is told from a line
 MOST_NAMED = 3
+MOST_ALONE = 5  # doubts about single pulls of one sample that are off the same way; more are told together
+NEARLY_ALL, HARDLY_ANY = 0.9, 0.1  # shares of the tests that are off, and of the others, with one value of a column
 FEWEST_COPIED, COPIED_SHARE, COPIED_DIGITS = 3, 0.25, 3  # pairs of forces with so many digits, equal by chance hardly
 FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
 NEAR = 0.25  # by which a factor may differ from that of a slip, as ln
@@ -75,8 +80,7 @@ def sibling_doubts(
     for names, log_factor, regimes in groups:
         doubts.append(_of_group(campaign, sorted(names), log_factor, regimes, len(table)))
     doubts += _copied(table)
-    order = sorted(found, key=lambda name: -max(abs(d) for d, _, _ in found[name].values()))
-    return (*doubts, *(_of_pull(ingested, name, found[name]) for name in order))
+    return (*doubts, *_of_pulls(ingested, found))
 
 
 def _copied(table: pd.DataFrame) -> Iterator[Doubt]:
@@ -148,7 +152,10 @@ def _split(pulls: Pulls, plausible: tuple[float, float]) -> tuple[np.ndarray, fl
 
 
 def _far(pulls: Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, float, float]]:
-    """Place, deviation of ln T from the siblings, and the deviation that chance reaches, of each pull beyond it."""
+    """Place, deviation of ln T from the siblings, and the deviation that chance reaches, of each pull beyond it.
+
+    Siblings that are far themselves are no measure: those that are far are judged once more, by the others.
+    """
     left = _from_siblings(pulls, _beside_law(pulls, log_force)[:, None])[:, 0]
     rng = np.random.default_rng(seed)
     drawn = _from_siblings(pulls, rng.standard_t(TAILS, (len(left), SPREADS)))
@@ -156,55 +163,69 @@ def _far(pulls: Pulls, log_force: FloatArray, seed: int) -> Iterator[tuple[int, 
     if not (spread > 0).any():
         return
     limit = float(np.quantile((np.abs(drawn) / _spread(pulls, drawn)).max(axis=0), 1.0 - CHANCE))
-    for k in np.flatnonzero(np.abs(left) > np.maximum(limit * spread, math.log(LEAST_RATIO))):
-        yield int(k), float(left[k]), float(limit * spread[k])
+    reach = np.maximum(limit * spread, math.log(LEAST_RATIO))
+    far = np.abs(left) > reach
+    if far.any():
+        left = _from_siblings(pulls, _beside_law(pulls, log_force, ~far)[:, None], ~far)[:, 0]
+        for k in np.flatnonzero(far & (np.abs(left) > reach)):
+            yield int(k), float(left[k]), float(limit * spread[k])
 
 
-def _beside_line(pulls: Pulls, log_force: FloatArray) -> FloatArray:
-    """ln T less that of a straight line T = mu N + T0 of its sample, shape (n,)."""
+def _beside_line(pulls: Pulls, log_force: FloatArray, known: BoolArray | None = None) -> FloatArray:
+    """ln T less that of a straight line T = mu N + T0 of its sample, shape (n,), through the ``known`` of the pulls."""
     left = np.empty_like(log_force)
-    for sample in np.unique(pulls["sample"]):
-        rows = np.flatnonzero(pulls["sample"] == sample)
+    for rows, use in _of_each_sample(pulls, known):
         load, own = pulls["load_N"][rows], log_force[rows]
-        line = _median_line(1.0 / load, np.exp(own) / load, load) * load
-        left[rows] = own - (np.log(line) if (line > 0).all() else np.median(own))
+        line = _median_line(1.0 / load, np.exp(own) / load, load, use) * load
+        left[rows] = own - (np.log(line) if (line > 0).all() else np.median(own[use]))
     return left
 
 
-def _beside_law(pulls: Pulls, log_force: FloatArray) -> FloatArray:
+def _beside_law(pulls: Pulls, log_force: FloatArray, known: BoolArray | None = None) -> FloatArray:
     """The same, or less T = a N^b of a sample of which that leaves less."""
-    left = _beside_line(pulls, log_force)
-    for sample in np.unique(pulls["sample"]):
-        rows = np.flatnonzero(pulls["sample"] == sample)
+    left = _beside_line(pulls, log_force, known)
+    for rows, use in _of_each_sample(pulls, known):
         load, own = pulls["load_N"][rows], log_force[rows]
-        if len(np.unique(pulls["level"][rows])) > FEWEST_LEVELS:
-            power = own - _median_line(np.log(load), own, load)
-            left[rows] = min(left[rows], power, key=lambda off: float(np.abs(off).sum()))
+        if len(np.unique(pulls["level"][rows][use])) > FEWEST_LEVELS:
+            power = own - _median_line(np.log(load), own, load, use)
+            left[rows] = min(left[rows], power, key=lambda off: float(np.abs(off[use]).sum()))
     return left
 
 
-def _median_line(x: FloatArray, y: FloatArray, load_N: FloatArray) -> FloatArray:
-    """The values of a straight line through (x, y) by repeated medians (Siegel 1982), of loads that are apart."""
-    log_load = np.log(load_N)
+def _of_each_sample(pulls: Pulls, known: BoolArray | None) -> Iterator[tuple[np.ndarray, BoolArray]]:
+    """The rows of each sample, and which of them are known: all where none is or nothing is said."""
+    for sample in np.unique(pulls["sample"]):
+        rows = np.flatnonzero(pulls["sample"] == sample)
+        use = np.ones(len(rows), bool) if known is None else known[rows]
+        yield rows, use if use.any() else ~use
+
+
+def _median_line(x: FloatArray, y: FloatArray, load_N: FloatArray, use: BoolArray) -> FloatArray:
+    """A straight line at x, through (x, y) in ``use`` by repeated medians (Siegel 1982), of loads that are apart."""
+    log_load, at, value = np.log(load_N[use]), x[use], y[use]
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.where(
             np.abs(log_load[:, None] - log_load[None, :]) > LOADS_APART,
-            (y[:, None] - y[None, :]) / (x[:, None] - x[None, :]), np.nan,
+            (value[:, None] - value[None, :]) / (at[:, None] - at[None, :]), np.nan,
         )  # fmt: skip
-    known = np.isfinite(slopes).any(axis=1)
-    slope = float(np.median(np.nanmedian(slopes[known], axis=1))) if known.any() else 0.0
-    return np.asarray(slope * x + np.median(y - slope * x))
+    told = np.isfinite(slopes).any(axis=1)
+    slope = float(np.median(np.nanmedian(slopes[told], axis=1))) if told.any() else 0.0
+    return np.asarray(slope * x + np.median(value - slope * at))
 
 
-def _from_siblings(pulls: Pulls, values: FloatArray) -> FloatArray:
-    """Values, shape (n, m), less the medians of their cells and specimens of three pulls or more (Tukey's polish)."""
-    left = values - np.median(values, axis=0)
+def _from_siblings(pulls: Pulls, values: FloatArray, known: BoolArray | None = None) -> FloatArray:
+    """Values, shape (n, m), less the medians of their cells and specimens of three pulls or more (Tukey's polish).
+
+    The medians are those of the ``known`` pulls, all where nothing is said.
+    """
+    use = np.ones(len(values), bool) if known is None else known
+    left = values - np.median(values[use], axis=0)
     for _ in range(3):
         for kinds in (pulls["cell"], pulls["body"]):
             for kind in range(kinds.max() + 1):
-                rows = np.flatnonzero(kinds == kind)
-                if len(rows) > 2:
-                    left[rows] -= np.median(left[rows], axis=0)
+                rows = kinds == kind
+                if (rows & use).sum() > 2:
+                    left[rows] -= np.median(left[rows & use], axis=0)
     return left
 
 
@@ -226,7 +247,8 @@ def _spread(pulls: Pulls, left: FloatArray) -> FloatArray:
 def _times(log_factor: float) -> str:
     """ "a hundred times" or "1.6 times"."""
     factor = math.exp(abs(log_factor))
-    near = next((words for f, words in FACTORS.items() if abs(math.log(factor / f)) < NEAR), f"{factor:.2g}")
+    plain = f"{factor:.2g}" if factor < 100.0 else f"{float(f'{factor:.2g}'):.0f}"
+    near = next((words for f, words in FACTORS.items() if abs(math.log(factor / f)) < NEAR), plain)
     return f"{near} times"
 
 
@@ -245,22 +267,49 @@ def _slip(log_factor: float, *, group: bool) -> str:
     return "another load, another specimen or another sample than stated, or a damaged record?"
 
 
-def _of_pull(ingested: Ingested, test_id: str, by_regime: Mapping[str, tuple[float, float, float]]) -> Doubt:
-    """The doubt about one pull, in the regime in which it is farther."""
-    regime = max(by_regime, key=lambda name: abs(by_regime[name][0]))
-    deviation, expected, reach = by_regime[regime]
-    test = next(t for t in ingested.campaign.tests if t.test_id == test_id)
-    force = expected * math.exp(deviation)
-    low, high = expected * math.exp(-reach), expected * math.exp(reach)
-    way = "above" if deviation > 0 else "below"
-    size = f"{100 * abs(math.expm1(deviation)):.0f} %" if abs(deviation) < math.log(3) else _times(deviation)
-    also = "" if len(by_regime) == 1 else ", and the other force as well"
-    where = f"{test.file}" if test.file else "tests.csv"
-    return Doubt(
-        "siblings", f"{regime} friction of test {test_id} ({test.sample} at {test.normal_load_N:.3g} N)",
-        f"{force:.3g} N, {size} {way} its siblings{also}", f"{low:.3g} to {high:.3g} N", f"tests.csv, {where}",
-        _slip(deviation, group=False), tests=(test_id,),
-    )  # fmt: skip
+def _of_pulls(
+    ingested: Ingested, found: Mapping[str, Mapping[str, tuple[float, float, float]]]
+) -> Iterator[Doubt]:
+    """Doubts about single pulls, the furthest first; of many of one sample that are off the same way, one doubt."""
+    tests = {t.test_id: t for t in ingested.campaign.tests}
+    farther = {name: max(own, key=lambda regime: abs(own[regime][0])) for name, own in found.items()}
+    order = sorted(found, key=lambda name: -abs(found[name][farther[name]][0]))
+    kinds: dict[tuple[str, bool], list[str]] = {}
+    for name in order:
+        kinds.setdefault((tests[name].sample, found[name][farther[name]][0] > 0), []).append(name)
+    for name in order:
+        (deviation, expected, reach), test = found[name][farther[name]], tests[name]
+        way = "above" if deviation > 0 else "below"
+        together = kinds[test.sample, deviation > 0]
+        if len(together) <= MOST_ALONE:
+            low, high = expected * math.exp(-reach), expected * math.exp(reach)
+            also = "" if len(found[name]) == 1 else ", and the other force as well"
+            yield Doubt(
+                "siblings", f"{farther[name]} friction of test {name} ({test.sample} at {test.normal_load_N:.3g} N)",
+                f"{expected * math.exp(deviation):.3g} N, {_far_off(deviation)} {way} its siblings{also}",
+                f"{low:.3g} to {high:.3g} N", f"tests.csv, {test.file}".removesuffix(", "),
+                _slip(deviation, group=False), tests=(name,),
+            )  # fmt: skip
+        elif name == together[0]:
+            least = _far_off(found[together[-1]][farther[together[-1]]][0])
+            regimes = [regime for regime in REGIMES if any(regime in found[other] for other in together)]
+            yield Doubt(
+                "siblings", f"{' and '.join(regimes)} friction of {len(together)} tests of {test.sample}",
+                f"{least} to {_far_off(deviation)} {way} that of siblings", "less, by the scatter of the others",
+                f"tests {_some_of(together)}{_in_common(ingested.campaign, together)}",
+                "another load, another specimen or another sample than stated, the beginning of a series, or damaged "
+                "records?", tests=tuple(together),
+            )  # fmt: skip
+
+
+def _far_off(deviation: float) -> str:
+    """ "18 %" or "410 times", of a deviation of ln T."""
+    return f"{100 * abs(math.expm1(deviation)):.0f} %" if abs(deviation) < math.log(3) else _times(deviation)
+
+
+def _some_of(test_ids: Sequence[str]) -> str:
+    more = f" and {len(test_ids) - MOST_NAMED} more" if len(test_ids) > MOST_NAMED else ""
+    return f"{', '.join(test_ids[:MOST_NAMED])}{more}"
 
 
 def _of_group(
@@ -268,23 +317,31 @@ def _of_group(
 ) -> Doubt:
     """The doubt about many pulls that are off by one factor, with what they have in common."""
     way = "larger" if log_factor > 0 else "smaller"
-    more = f" and {len(test_ids) - MOST_NAMED} more" if len(test_ids) > MOST_NAMED else ""
-    named = f"{', '.join(test_ids[:MOST_NAMED])}{more}{_in_common(campaign, test_ids)}"
     return Doubt(
         "siblings", f"{' and '.join(regimes)} friction of {len(test_ids)} of {tests} tests",
         f"about {_times(log_factor)} {way} than that of equal tests", "one unit and one range for all exports",
-        f"tests {named}", _slip(log_factor, group=True), tests=tuple(test_ids),
+        f"tests {_some_of(test_ids)}{_in_common(campaign, test_ids)}", _slip(log_factor, group=True),
+        tests=tuple(test_ids),
     )  # fmt: skip
 
 
 def _in_common(campaign: Campaign, test_ids: Sequence[str]) -> str:
-    """ " (all of 2026-03-04)": the value of a column that these tests have and no other test."""
+    """ ", all of day 2026-03-04": the value of a column that (nearly) all of these tests have and hardly any other."""
     chosen = set(test_ids)
-    for name in ("started_at", "operator", "specimen", "sample", "repeat"):
+    stated = ("started_at", "operator", "specimen", "sample", "repeat")
+    recorded = dict.fromkeys(name for t in campaign.tests for name in t.covariates)
+    for name in (*stated, *recorded):
         end = 10 if name == "started_at" else None
-        values = [(t.test_id in chosen, str(getattr(t, name, "") or "")[:end]) for t in campaign.tests]
-        inside, outside = ({v for own, v in values if own == side} for side in (True, False))
-        if inside and not inside & outside and "" not in inside and len(inside) <= MOST_NAMED:
-            words = {"started_at": "day", "repeat": "repeat"}.get(name, name)
-            return f", all of {words} {', '.join(sorted(inside))}"
+        values = [
+            (t.test_id in chosen, str((t.covariates if name in recorded else vars(t)).get(name) or "")[:end])
+            for t in campaign.tests
+        ]
+        inside, outside = ([v for own, v in values if own == side] for side in (True, False))
+        words = {"started_at": "day"}.get(name, name)
+        if not set(inside) & set(outside) and "" not in inside and len(set(inside)) <= MOST_NAMED:
+            return f", all of {words} {', '.join(sorted(set(inside)))}"
+        usual = max(inside, key=inside.count, default="")
+        share, elsewhere = inside.count(usual) / max(len(inside), 1), outside.count(usual) / max(len(outside), 1)
+        if usual and share >= NEARLY_ALL and elsewhere <= HARDLY_ANY:
+            return f", {'all' if share == 1.0 else f'{inside.count(usual)} of them'} of {words} {usual}"
     return ""

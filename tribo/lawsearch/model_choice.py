@@ -44,7 +44,7 @@ from tribo.lawsearch.scoring import Courses, Grammar, Projection, acts_of, effec
 from tribo.mechanisms.conditions import levels_of
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
-from tribo.vocabulary import COLUMNS
+from tribo.vocabulary import described
 
 CLOSE = 3.0  # log likelihood within which laws cannot be told apart: odds of 20 to 1
 IN_REACH = 8.0  # below the best on the coarse grid, within which a form is looked at on the fine one
@@ -328,7 +328,7 @@ def _told_at(shapes: Sequence[Shape], c: Conditions) -> dict[int, str]:
         values = np.array(shape.values, float)
         near = np.quantile(recorded_values(c, shape.column), LOW_TO_HIGH)
         along.append(np.unique(np.abs(values[:, None] - near).argmin(axis=0)).tolist())
-    units = [COLUMNS[s.column].unit if s.column in COLUMNS else "" for s in shapes]
+    units = [described(s.column).unit for s in shapes]
     named = [
         {k: f"{_as_read(shape.column, shape.values[k])} {unit}".rstrip() for k in places}
         for shape, places, unit in zip(shapes, along, units, strict=True)
@@ -435,7 +435,7 @@ def _as_read(column: str, value: float | str) -> str:
     """A value of a column in the unit in which it is read."""
     if isinstance(value, str):
         return value
-    return f"{value * (COLUMNS[column].factor if column in COLUMNS else 1.0):.4g}"
+    return f"{value * described(column).factor:.4g}"
 
 
 def _through_levels(at: Background, law: WrittenLaw, gained: float) -> tuple[WrittenLaw, ...]:

@@ -23,7 +23,7 @@ from tribo.wording import study_sentences as study_words
 from tribo.wording.numerals import counted, joined, loads_in_words, with_uncertainty
 from tribo.wording.part_sentences import TAKEN_UP, name_in_words, not_varied
 from tribo.wording.study_sentences import bent_laws, friction_sentence, specimens_of, uncertainty_kind
-from tribo.wording.verdict_sentences import meanings, verdict_in_words, why_next
+from tribo.wording.verdict_sentences import meanings, verdict_in_words, why_next, without_model
 
 MOST_REASONS = 3
 NUMBERS = {"mu": "μ", "tau0_Pa": "τ₀", "T0_N": "T₀"}
@@ -271,11 +271,17 @@ def card_text(card: Card) -> str:
 
 
 def verdict_text(v: Verdict) -> str:
-    """What a finding rests on, for a terminal: evidence, misfits, causes with intervals, ties and gain."""
+    """What a finding rests on, for a terminal: evidence, misfits, causes with weights, ties and gain.
+
+    What the finding says already in the same words is not said again.
+    """
     words = verdict_in_words(v)
+    told = [c["text"] for c in words["causes"] if c["text"] in v.sentence]
     lines = [words["evidence"]]
-    lines += [f"  misfit: {misfit['text']}" for misfit in words["misfits"]]
-    lines += [f"  cause, weight {c['weight']}: {c['text']}" for c in words["causes"]]
+    lines += [f"  misfit: {misfit['text']}" for misfit in words["misfits"] if not (told and without_model(v))]
+    lines += [
+        f"  cause, weight {c['weight']}: {c['mechanism'] if c['text'] in told else c['text']}" for c in words["causes"]
+    ]
     lines += [f"  {text}" for text in (*words["equivalent"], words["gain"])]
     return "\n".join(line for line in lines if line.strip())
 

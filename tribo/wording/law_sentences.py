@@ -14,7 +14,7 @@ from tribo.lawsearch.grammar import ALL, BOTH, CAVITY_SHARE, ELONGATION, FLAT, P
 from tribo.lawsearch.known_laws import SHOWS, PlannedLaw, Untested, Validation
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.search import Discovery
-from tribo.vocabulary import COLUMNS, in_words
+from tribo.vocabulary import described, in_words
 from tribo.wording.numerals import general, interval, p_text, signed
 
 NAMED = 3  # tied laws that are written out in a sentence
@@ -41,7 +41,7 @@ def law_sentence(found: FoundLaw) -> str:
 def level_sentence(law: WrittenLaw, levels: Mapping[str, Estimate]) -> str:
     """ "Sliding friction depends on the pull speed: −10 % (90 % interval −12 to −8 %) at 0.05 mm/s, ..."."""
     column = law.columns[0]
-    unit = COLUMNS[column].unit if column in COLUMNS else ""
+    unit = described(column).unit
     return f"{subject(law)} depends on {in_words(column)}: {each_value(levels, unit)}"
 
 
@@ -49,7 +49,7 @@ def curve_sentence(law: WrittenLaw, places: Mapping[str, Estimate]) -> str:
     """ "Sliding friction follows the humidity along a curve: −10 % (90 % interval −12 to −8 %) at 30 %, ..."; of a
     surface, at pairs of values."""
     column, *others = law.columns
-    unit = COLUMNS[column].unit if column in COLUMNS and not others else ""
+    unit = "" if others else described(column).unit
     said = each_value(places, unit, "the mean over the tests")
     if others:
         return f"{subject(law)} follows {in_words(column)} and {in_words(others[0])} together: {said}"
@@ -126,7 +126,7 @@ def _value(s: Shape, x: float) -> str:
 
 def _readable(column: str) -> tuple[float, str]:
     """The factor and the unit in which a column stands in a sentence."""
-    return (COLUMNS[column].factor, COLUMNS[column].unit) if column in COLUMNS else (1.0, "")
+    return described(column).factor, described(column).unit
 
 
 def tied_laws(ties: Sequence[WrittenLaw], *, by_values: bool = False) -> str:

@@ -17,7 +17,7 @@ from tribo.lawsearch.known_laws import KnownLaw
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.mechanisms import MECHANISMS, mechanism
 from tribo.mechanisms.record import Mechanism, TraceEvidence
-from tribo.vocabulary import COLUMNS, OBSERVABLES, ColumnWords, in_words
+from tribo.vocabulary import OBSERVABLES, described, in_words
 from tribo.wording.law_sentences import each_value, law_sentence, law_test, size_sentence, tied_laws
 from tribo.wording.numerals import (
     counted,
@@ -77,7 +77,9 @@ def meaning_in_words(name: str, shows: object = None) -> str:
     if isinstance(shows, tuple) and shows and isinstance(shows[0], RunningIn):
         return "within one record, friction changes with the distance"
     _, _, column = name.partition(":")
-    return f"friction follows {in_words(column)}, which no other mechanism uses" if column else mechanism(name).meaning
+    if column:
+        return f"friction changes with {in_words(column)}, and no mechanism of the library explains it"
+    return mechanism(name).meaning
 
 
 def with_choice(name: str, choice: str) -> str:
@@ -88,7 +90,7 @@ def with_choice(name: str, choice: str) -> str:
 
 def estimate_text(name: str, e: Estimate) -> str:
     """ "n = 0.27 (90 % interval 0.241 to 0.3)"."""
-    return f"{name} = {e.value:.3g} {e.unit}".rstrip() + f" (90 % interval {e.low:.3g} to {e.high:.3g})"
+    return true_minus(f"{name} = {e.value:.3g} {e.unit}".rstrip() + f" (90 % interval {e.low:.3g} to {e.high:.3g})")
 
 
 def signs_of(m: Mechanism) -> str:
@@ -204,8 +206,8 @@ def layer_sentence(layer: Layer) -> str:
     if layer.kind != "cause" or layer.most is None:
         return layer.text
     if layer.levels and layer.kind == "cause":
-        words = COLUMNS.get(layer.over["column"], None) if layer.over else None
-        said = f"{sentence_case(name_in_words(layer.name))}: {each_value(layer.levels, words.unit if words else '')}."
+        unit = described(layer.over["column"]).unit if layer.over else ""
+        said = f"{sentence_case(name_in_words(layer.name))}: {each_value(layer.levels, unit)}."
         return f"{said} {tied_laws(shows)}" if tied else said
     if layer.over:
         said = f"{sentence_case(mechanism(layer.name).in_words)} changes T by {change_over_range(layer.over)}."
@@ -219,7 +221,7 @@ def layer_sentence(layer: Layer) -> str:
 
 def change_over_range(over: Mapping[str, Any]) -> str:
     """ "+25 % (90 % interval +22 to +29 %) as the pull speed rises from 0.05 to 0.8 mm/s"."""
-    words = COLUMNS.get(over["column"], ColumnWords(over["column"]))
+    words = described(over["column"])
     start, end = (f"{words.factor * over[key]:.3g}" for key in ("from", "to"))
     sizes = [signed(over[key]) for key in ("percent", "low", "high")]
     return (
@@ -240,7 +242,8 @@ def _own_law(layer: Layer) -> str:
     """The law of one sample alone, and what a straight line leaves at zero load."""
     (regime,), (sample,) = layer.regimes, layer.samples
     if "T/N" in layer.parameters:
-        return f"Mean {regime} T/N of {sample}: {_sized(layer.parameters['T/N'])}; the loads do not determine a law."
+        mean = f"Mean {regime} T/N of {sample}: {_sized(layer.parameters['T/N'])}"
+        return f"{mean}; measured at too few loads to choose the form of a law."
     sizes = joined([f"{SYMBOLS.get(n, n)} = {_sized(e)}" for n, e in layer.parameters.items()])
     said = f"{sentence_case(regime)} friction of {sample} follows {layer.formula} with {sizes}."
     if layer.shows is None:
@@ -260,7 +263,7 @@ def _own_law(layer: Layer) -> str:
 
 def _sized(e: Estimate) -> str:
     said = f"{e.value:.3g} {e.unit}".rstrip()
-    return f"{said} (90 % interval {e.low:.3g} to {e.high:.3g})" if math.isfinite(e.low) else said
+    return true_minus(f"{said} (90 % interval {e.low:.3g} to {e.high:.3g})" if math.isfinite(e.low) else said)
 
 
 def without_model_sentence(shows: Sequence[Any]) -> str:
@@ -269,14 +272,20 @@ def without_model_sentence(shows: Sequence[Any]) -> str:
 
 
 def _follows(f: ColumnEffect) -> str:
-    unit = f" {COLUMNS[f.name].unit}".rstrip() if f.name in COLUMNS else ""
+    unit = f" {described(f.name).unit}".rstrip()
     first, last = f.where
-    between = f"from {first} to {last}{unit}" if f.kind == "trend" else f"between {first} and {last}{unit}"
     low, high = sorted((abs(f.low_percent), abs(f.high_percent)))
+    size = f"{abs(f.change_percent):.1f} %"
+    numbers = [x for x in (first, last) if x.replace(".", "").isdigit()]
+    if f.kind == "trend" or (len(numbers) == 2 and float(first) < float(last)):
+        way = "rises" if f.change_percent > 0 else "falls"
+        change = f"{way} by {size} with {in_words(f.name)}, from {first} to {last}{unit}"
+    else:
+        way = "higher" if f.change_percent > 0 else "lower"
+        change = f"is {size} {way} with {in_words(f.name)} {last}{unit} than with {first}{unit}"
     said = (
-        f"{sentence_case(f.regime)} friction {'rises' if f.change_percent > 0 else 'falls'} by "
-        f"{abs(f.change_percent):.1f} % with {in_words(f.name)}, {between} (90 % interval {low:.1f} to {high:.1f} %, "
-        f"adjusted p {p_text(f.p)})."
+        f"{sentence_case(f.regime)} friction {change} (90 % interval {low:.1f} to {high:.1f} %, adjusted p "
+        f"{p_text(f.p)})."
     )
     if f.alike:
         said += f" This design cannot tell {in_words(f.name)} from {' and '.join(map(in_words, f.alike))}."
@@ -375,7 +384,7 @@ def next_test_sentence(t: NextTest) -> str:
     if t.kind == "pull further":
         return f"{pulls} further pulls of {design['sample']} at {design['normal_load_N']:.3g} N."
     if t.kind == "confirm":
-        words = COLUMNS[str(design["covariate"])]
+        words = described(str(design["covariate"]))
         values = joined([f"{value * words.factor:.3g}" for value in design["values"]])
         where = f"{in_words(str(design['covariate']))} at {values} {words.unit}"
         return f"Pull {design['sample']} {pulls} times in random order with {where}, which were not measured."
@@ -397,7 +406,7 @@ def next_test_sentence(t: NextTest) -> str:
         steps = [vary] if varied else []
         return " ".join([*steps, *(f"{sentence_case(step)}: {each} {patterned}." for step in removed)])
     if t.kind == "measure more":
-        counts = [(design["pulls"], "pull"), (design["loads"], "load"), (design["samples"], "sample")]
+        counts = [(design["pulls"], "test"), (design["loads"], "load"), (design["samples"], "sample")]
         return f"Measure at least {joined([counted(n, noun) for n, noun in counts if n > 1])}, in random order."
     if t.kind == "part laws":
         difference, law, other = t.shows

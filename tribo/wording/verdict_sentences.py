@@ -28,7 +28,7 @@ from tribo.diagnostics.verdict import (
 )
 from tribo.diagnostics.without_model import ColumnsTested
 from tribo.mechanisms.record import TraceEvidence
-from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words, short_label
+from tribo.vocabulary import OBSERVABLES, described, in_words, short_label
 from tribo.wording.law_sentences import across_sentence, held_sentence, tied_laws
 from tribo.wording.numerals import (
     counted,
@@ -467,12 +467,12 @@ def why_next(v: Verdict) -> str:
     if v.verdict == "cannot_tell":
         return "with fewer, nothing can be told from chance"
     if not separates:
-        return "it is the most informative test"
+        return "with fewer, what else friction varies with cannot be told"
     if v.next_test is not None and v.next_test.kind == "vary what was fixed":
         return f"this campaign could not test {joined(list(map(name_in_words, separates)))}"
     if v.next_test is not None and v.next_test.kind == "confirm":
         design = v.next_test.design
-        words = COLUMNS[str(design["covariate"])]
+        words = described(str(design["covariate"]))
         low, *_, high = (value * words.factor for value in design["values"])
         change = f"{signed(design['expected_percent'])} %"
         over = f"{design['regime']} friction from {low:.3g} to {high:.3g} {words.unit}"
