@@ -254,7 +254,8 @@ def test_running_in_within_records_is_not_explained_as_a_matter_of_first_pulls()
 @pytest.mark.parametrize(
     ("column", "label"),
     [("radius_mm", "radius (mm)"), ("slide_speed_um_s", "slide speed (µm/s)"), ("spring_N_per_m", "spring (N/m)"),
-     ("cure_time_h", "cure time (h)"), ("rh_pct", "rh (%)"), ("SequenceID", "SequenceID"), ("speed_mm_s", "pull speed (mm/s)")],
+     ("cure_time_h", "cure time (h)"), ("rh_pct", "rh (%)"), ("SequenceID", "SequenceID"),
+     ("speed_mm_s", "pull speed (mm/s)")],
 )  # fmt: skip
 def test_a_users_own_column_is_named_with_the_unit_that_ends_its_name(column: str, label: str) -> None:
     assert label_with_unit(column) == label
