@@ -86,7 +86,7 @@ def campaign_budgets(
         if (pull := ingested.pulls.get(test.test_id)) is not None and np.isfinite(pull.rise_N_per_s):
             rises.setdefault(test.sample, []).append(pull.rise_N_per_s)
     rise = {sample: float(np.median(values)) for sample, values in rises.items()}
-    defaults = DEFAULTS if any(test.mass_kg for test in campaign.tests) else DEFAULTS_WITHOUT_MASSES
+    table.attrs["states_masses"] = any(test.mass_kg for test in campaign.tests)
     found = []
     for regime in dict.fromkeys(fit.regime for fit in usable):
         rows = {r.sample: r for r in sample_rows(table, regime)}
@@ -98,7 +98,7 @@ def campaign_budgets(
             found.append(
                 uncertainty_budget(
                     table, fit, campaign.instrument, weights=weights, sampling_rate_Hz=stated, load_N=load_N,
-                    rise_N_per_s=rise.get(fit.sample, float("nan")), defaults=defaults,
+                    rise_N_per_s=rise.get(fit.sample, float("nan")),
                 )
             )  # fmt: skip
     return tuple(found)
@@ -113,7 +113,6 @@ def uncertainty_budget(
     rise_N_per_s: float = float("nan"),
     sampling_rate_Hz: float = float("nan"),
     load_N: float | None = None,
-    defaults: Mapping[str, tuple[float, str]] = DEFAULTS,
 ) -> tuple[LawFit, pd.DataFrame]:
     """One fit of ``fit_samples(table, ..., weights=weights)`` with its combined uncertainty, and the budget of that.
 
@@ -121,13 +120,13 @@ def uncertainty_budget(
     ----------
     table : that of ``Ingested.table()``
     fit : the fitted law; its covariance is the type A part
-    instrument : settings of campaign.toml (standard uncertainties, k = 1); what it lacks is taken from ``defaults``
+    instrument : settings of campaign.toml (standard uncertainties, k = 1); what it lacks is taken from ``DEFAULTS``
+        or, where ``table.attrs["states_masses"]`` is false, from ``DEFAULTS_WITHOUT_MASSES``
     weights : of the fit
     rise_N_per_s, sampling_rate_Hz : slope of the force before the peak, and f_s
         Together the sampling clip of static friction: a peak between two samples is read low by up to
         rise/(2 f_s) = k v/(2 f_s), taken as rectangular about zero because it is not corrected.
     load_N : where T is judged; a pressure of 10 kPa where it is not given
-    defaults : a value and its reason for each setting of the instrument
 
     Returns
     -------
@@ -156,6 +155,7 @@ def uncertainty_budget(
         load_N = PRESSURE_PA * fit.nominal_area_m2 if fit.nominal_area_m2 else float(np.median(rows.load_N))
     by = sensitivities(fit, load_N)
     rows_a, notes = _type_a(rows, fit, weights, by)
+    defaults = DEFAULTS if table.attrs.get("states_masses", True) else DEFAULTS_WITHOUT_MASSES
     changes = _type_b(fit, instrument, defaults, rise_N_per_s, sampling_rate_Hz)
     if fit.regime == "static" and not np.isfinite(rise_N_per_s * sampling_rate_Hz):
         notes += ("component sampling clip left out: the rise before the peak or the sampling rate is not known",)

@@ -350,9 +350,12 @@ def _of_sliding(time: FloatArray, force: FloatArray, pull: Pull) -> dict[str, Fe
         found["drift_N_per_s"] = Feature(slope, u, slope - half, slope + half, int(x.size))
     slope, middle, mean = line(at, part)
     away = part - mean - slope * (at - middle)
-    rough, free = float(away.std()) / abs(mean), max(part.size / _correlation_time(away), 2.0)
-    low, high = (rough * math.sqrt(free / float(chi2.ppf(p, free))) for p in (0.975, 0.025))
-    found["roughness"] = Feature(rough, (high - low) / (2.0 * _NORMAL), low, high, part.size)
+    if not away.any():
+        return found  # a force that stands still, to the bit, has neither roughness nor a frequency
+    if mean:
+        rough, free = float(away.std()) / abs(mean), max(part.size / _correlation_time(away), 2.0)
+        low, high = (rough * math.sqrt(free / float(chi2.ppf(p, free))) for p in (0.975, 0.025))
+        found["roughness"] = Feature(rough, (high - low) / (2.0 * _NORMAL), low, high, part.size)
     pace = float(at[-1] - at[0]) / (at.size - 1)
     even = np.interp(at[0] + pace * np.arange(at.size), at, away)
     frequency, power = welch(even, 1.0 / pace, nperseg=min(even.size, max(256, even.size // 4)))
