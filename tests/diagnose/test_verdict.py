@@ -9,7 +9,7 @@ import pytest
 
 from tribo.diagnostics import Diagnosis, examine
 from tribo.diagnostics.planning import bits
-from tribo.diagnostics.verdict import Misfit, Verdict
+from tribo.diagnostics.verdict import Excluded, Misfit, Verdict
 from tribo.errors import FitError
 from tribo.records import SetAside
 from tribo.wording.verdict_sentences import worded
@@ -47,6 +47,13 @@ def test_numbers_that_do_not_exist_are_null_not_nan() -> None:
     assert plain["misfits"][0]["effect_percent"] is None
     assert plain["set_aside"] == [{"test_id": "T1", "reason": "x"}]
     assert plain["gain"] is None
+
+
+def test_a_mechanism_that_loses_to_a_law_of_its_own_column_is_named_as_what_can_be_the_cause() -> None:
+    differs = Misfit("both", "", "humidity_pct", 371.0, 1e-11, "")
+    lost = Verdict("unknown", misfits=(differs,), excluded=(Excluded("humidity", "a law explains more", 23.5),))
+    assert worded(lost).sentence.endswith("humidity can be its cause, with another formula than that of the library.")
+    assert worded(replace(lost, excluded=())).sentence.endswith("no mechanism of the library explains it.")
 
 
 def test_suction_and_a_load_error_are_named_together_with_a_test_that_parts_them(tied: Diagnosis) -> None:

@@ -78,6 +78,15 @@ def test_the_main_frequency_is_that_of_a_swing_in_it() -> None:
     assert found["main_share"].value > 0.7
 
 
+@pytest.mark.parametrize("stuck_N", [0.0, 1.3])
+def test_a_force_that_stands_still_to_the_bit_has_neither_roughness_nor_a_frequency(stuck_N: float) -> None:
+    time, force, _ = pull_from_rest(FromRest(noise=0.002, drops=0), 1)
+    pull = read(time, force, 1e-3)[0]
+    force[time >= pull.window_s[0]] = pull.zero_N + stuck_N
+    found = features_of(Trace("stuck", time, force), pull, 1e-3)
+    assert not {"roughness", "main_frequency_Hz", "main_share"} & set(found)
+
+
 def test_every_feature_has_a_unit_in_its_name_and_stands_in_the_documentation() -> None:
     text = " ".join(DOCS.read_text(encoding="utf-8").split())
     for name, definition in FEATURES.items():

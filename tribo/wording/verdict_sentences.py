@@ -242,7 +242,9 @@ def _unknown(v: Verdict) -> str:
 
 
 def _by_no_mechanism(v: Verdict) -> str:
-    """That nothing explains it, and whether the design could test every mechanism."""
+    """That nothing explains it, and whether the design could test every mechanism; or whose formula explains less."""
+    if lost := [name_in_words(e.mechanism) for e in v.excluded if e.why == "a law explains more"]:
+        return f"{joined(lost)} can be its cause, with another formula than that of the library"
     tested = "that this design can test" if v.not_testable else "of the library"
     return f"no mechanism {tested} explains it"
 
