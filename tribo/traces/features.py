@@ -350,7 +350,7 @@ def _of_sliding(time: FloatArray, force: FloatArray, pull: Pull) -> dict[str, Fe
         found["drift_N_per_s"] = Feature(slope, u, slope - half, slope + half, int(x.size))
     slope, middle, mean = line(at, part)
     away = part - mean - slope * (at - middle)
-    if not away.any():
+    if not np.ptp(part):
         return found  # a force that stands still, to the bit, has neither roughness nor a frequency
     if mean:
         rough, free = float(away.std()) / abs(mean), max(part.size / _correlation_time(away), 2.0)
