@@ -443,12 +443,13 @@ def vagueness(v: Verdict) -> dict[str, float]:
 
 
 def sharper(before: dict[str, float], after: dict[str, float]) -> bool:
-    """Less is left open in number; or as much, and the size is known better."""
+    """Less is left open in number; or as much, and the size is known better, or for the first time."""
     counts = ("undecided", "alternatives", "untested", "ties")
     fewer = [after[k] - before[k] for k in counts]
     if any(step < 0 for step in fewer):
         return all(step <= 0 for step in fewer[:2])
-    return not any(step > 0 for step in fewer) and bool(after["width"] < before["width"])
+    known = np.isfinite(after["width"]) and not after["width"] >= before["width"]
+    return not any(step > 0 for step in fewer) and bool(known)
 
 
 def work(piece: Piece) -> dict[str, Any]:
