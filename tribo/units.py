@@ -87,7 +87,8 @@ QUANTITIES: dict[str, Quantity] = {
             coeficiente de rozamiento, coefficient de friction, коэффициент трения, 摩擦系数, 摩擦係数, 마찰계수
         """),
         _quantity("torque", "M", "N m", "torque_Nm", """
-            friction torque, torque, frictional torque, friction moment, reibmoment, drehmoment, moment, couple,
+            friction torque, torque, frictional torque, axial torque, spindle torque, measured torque, torque cell,
+            friction moment, reibmoment, drehmoment, moment, couple,
             couple de frottement, moment de frottement, coppia, momento, par, koppel, moment tarcia, moment sily,
             момент, момент трения, 扭矩, 摩擦力矩, トルク, 摩擦トルク, 토크
         """),

@@ -32,6 +32,8 @@ def written(path: Path, head: str, columns: list[np.ndarray], separator: str, co
          [TIME, LOAD, 0 * TIME + 15, FORCE], ",", False, "utf-8"),
         ("time_s,torque_Nm,axial_force_N,rpm,radius_mm",
          [TIME, 0.02 * FORCE, LOAD, 0 * TIME + 100, 0 * TIME + 20], ",", False, "utf-8"),
+        ("Time (sec),Axial Force (N),Axial Torque (N-mm),Radius (mm)", [TIME, LOAD, 20 * FORCE, 0 * TIME + 20], ",", False,
+         "utf-8"),
         ("Tiempo (s);Fuerza de rozamiento (N);Carga normal (N)", [TIME, FORCE, LOAD], ";", True, "cp1252"),
         ("Tempo [s];Forza di attrito [N];Carico normale [N]", [TIME, FORCE, LOAD], ";", True, "cp1252"),
         ("Tempo (s);Força de atrito média (N);Força normal (N)", [TIME, FORCE, LOAD], ";", True, "cp1252"),
