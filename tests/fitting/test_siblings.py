@@ -133,3 +133,35 @@ def test_many_pulls_of_one_sample_that_lie_low_are_one_doubt_with_the_column_the
     assert "friction of 8 tests of B" in doubt.name
     assert "all of cycle 1" in doubt.place
     assert re.fullmatch(r"(5\d|6\d) % to [45](\.\d)? times below that of siblings", doubt.found)  # 60 % to 5 times
+
+
+@pytest.mark.parametrize(("step", "way"), [(1, "down"), (-1, "up")])
+def test_loads_that_slipped_by_a_row_are_named_with_the_tests_and_no_other(
+    ingested: Ingested, step: int, way: str
+) -> None:
+    tests = [t for t in ingested.campaign.tests if t.test_id in ingested.pulls]
+    order = np.random.default_rng(3).permutation(len(tests))
+    tests = [tests[k] for k in order]
+    loads = [t.normal_load_N for t in tests]
+    slipped = loads[:20] + [loads[20:40][(k - step) % 20] for k in range(20)] + loads[40:]
+    moved = tuple(replace(t, normal_load_N=load) for t, load in zip(tests, slipped, strict=True))
+    doubt, *others = sibling_doubts(replace(ingested, campaign=replace(ingested.campaign, tests=moved)))
+    wrong = {t.test_id for t, a, b in zip(tests, loads, slipped, strict=True) if a != b}
+    assert {name for d in (doubt, *others) for name in d.tests} <= wrong
+    assert len(doubt.tests) >= len(wrong) - 1  # the load that is left over may be that of either end
+    assert f"move mass_g {'up' if way == 'down' else 'down'} by one row" in doubt.slip
+
+
+def test_of_two_parts_that_differ_the_one_is_wrong_that_does_not_follow_the_loads(ingested: Ingested) -> None:
+    rng = np.random.default_rng(4)
+    cells: dict[tuple[str, float], list[str]] = {}
+    for t in ingested.campaign.tests:
+        if t.specimen.endswith(("1", "2")):
+            cells.setdefault((t.sample, round(t.normal_load_N, 2)), []).append(t.test_id)
+    chosen = [str(rng.choice(names)) for names in list(cells.values())[::3]]
+    kept = tuple(t for t in ingested.campaign.tests if t.specimen.endswith(("1", "2")))
+    few = replace(ingested, campaign=replace(ingested.campaign, tests=kept),
+                  pulls={t.test_id: ingested.pulls[t.test_id] for t in kept})  # fmt: skip
+    for factor in (100.0, 0.01):
+        doubt, *_ = sibling_doubts(times(few, dict.fromkeys(chosen, factor)))
+        assert set(doubt.tests) == set(chosen)

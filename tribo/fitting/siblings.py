@@ -27,11 +27,14 @@ SPLIT = 5.0  # ratio between equal pulls that no scatter of repeats or specimens
 FEWEST_SPLIT, LEAST_SPLIT = 3, 0.25  # cells, and the share of all, that a slip of many exports splits
 LOADS_APART = 0.1  # by which two loads differ, as ln, at the least: the line of loads that are alike leads anywhere
 FEWEST_LEVELS = 3  # of load, beyond which a power is told from a line
+SAME_LOAD = 0.02
+FEWEST_MOVED, MOVED_LEFT = 4, 0.4  # tests in a block of moved loads, and the share that is left when put back
 MOST_NAMED = 3
 MOST_ALONE = 5  # doubts about single pulls of one sample that are off the same way; more are told together
 NEARLY_ALL, HARDLY_ANY = 0.9, 0.1  # shares of the tests that are off, and of the others, with one value of a column
 FEWEST_COPIED, COPIED_SHARE, COPIED_DIGITS = 3, 0.25, 3  # pairs of forces with so many digits, equal by chance hardly
 FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
+AS_MUCH = 0.1  # by which two corrections of a group differ in what they leave, at the most, if neither is better
 NEAR = 0.25  # by which a factor may differ from that of a slip, as ln
 
 
@@ -58,6 +61,8 @@ def sibling_doubts(
     campaign, table = ingested.campaign, ingested.table()
     found: dict[str, dict[str, tuple[float, float, float]]] = {}
     doubts: list[Doubt] = []
+    if len(table) and (moved := _moved(campaign, table)):
+        doubts, table = [moved[0]], moved[1]
     groups: list[tuple[set[str], float, list[str]]] = []
     for regime in REGIMES if len(table) else ():
         pulls = _pulls_of(table, regime)
@@ -81,6 +86,80 @@ def sibling_doubts(
         doubts.append(_of_group(campaign, sorted(names), log_factor, regimes, len(table)))
     doubts += _copied(table)
     return (*doubts, *_of_pulls(ingested, found))
+
+
+def _moved(campaign: Campaign, table: pd.DataFrame) -> tuple[Doubt, pd.DataFrame] | None:
+    """The doubt that a block of rows has the loads of the rows beside them, and the table with the loads put back.
+
+    By the laws of the samples, the block that gains most where each of its tests has the load of the next row, or of
+    the one before. The load that is left over is that of the other end of the block, where it fits there.
+    """
+    stated = [t.test_id for t in campaign.tests]
+    loads = pd.Series([t.normal_load_N for t in campaign.tests], stated)
+    best: tuple[float, int, int, int] = (0.0, 0, 0, 0)
+    for step in (1, -1):
+        theirs = loads.shift(-step)
+        off, beside = _beside_laws(table, theirs)
+        changed = (~np.isclose(loads, theirs, rtol=SAME_LOAD)) & np.isfinite(theirs.to_numpy())
+        total = np.concatenate([[0.0], np.cumsum(np.where(changed, np.nan_to_num(off - beside), 0.0))])
+        last = int(np.argmax(total - np.minimum.accumulate(total)))
+        first = int(np.argmin(total[: last + 1]))
+        rows = first + np.flatnonzero(changed[first:last] & np.isfinite(off[first:last]))
+        fits = beside[rows].sum() < MOVED_LEFT * off[rows].sum()
+        if len(rows) >= FEWEST_MOVED and fits and total[last] - total[first] > best[0]:
+            best = (float(total[last] - total[first]), step, first, last)
+    won, step, first, last = best
+    if not won:
+        return None
+    low, high = (first, last + 1) if step > 0 else (first - 1, last)
+    block = stated[low:high]
+    back = pd.Series(np.roll(loads.iloc[low:high].to_numpy(), -step), block)
+    end = block[-1] if step > 0 else block[0]
+    off, beside = _beside_laws(table, pd.Series(back[end], stated))
+    if not beside[stated.index(end)] < off[stated.index(end)]:
+        back[end] = loads[end]
+    mended = table.assign(normal_load_N=table["test_id"].map(back).fillna(table["normal_load_N"]))
+    column = "mass_g" if any(t.load_from == "mass_g" for t in campaign.tests) else "normal_load_N"
+    moved = tuple(i for i in block if not math.isclose(back[i], loads[i], rel_tol=SAME_LOAD))
+    doubt = Doubt(
+        "siblings", f"{column} from test {moved[0]} to {moved[-1]}",
+        f"by the forces that of the {'next row' if step > 0 else 'row before'}", "that of its own test",
+        f"tests.csv, column {column}",
+        f"a cell was put in or taken out: move {column} {'up' if step > 0 else 'down'} by one row there?", tests=moved,
+    )  # fmt: skip
+    return doubt, mended
+
+
+def _beside_laws(table: pd.DataFrame, theirs_N: pd.Series) -> tuple[FloatArray, FloatArray]:
+    """How far ln T of each test lies from the line of its sample, at its own load and at that of ``theirs_N``, by name.
+
+    The larger of both regimes; nan where there is no force.
+    """
+    found = np.full((2, len(theirs_N)), np.nan)
+    for regime in REGIMES:
+        pulls = _pulls_of(table, regime)
+        names = pulls["test_id"]
+        if len(names) < 6:
+            continue
+        at, known = theirs_N.index.get_indexer(pd.Index(names)), np.ones(len(names), bool)
+        for _ in range(2):  # once more without those that the first laws find far off
+            both = np.abs(_beside_line_at(pulls, theirs_N[names].to_numpy(float), known))
+            known = both[0] < max(3.0 * float(np.median(both[0])), math.log(LEAST_RATIO))
+        found[:, at] = np.fmax(found[:, at], both)
+    return found[0], found[1]
+
+
+def _beside_line_at(pulls: Pulls, others_N: FloatArray, known: BoolArray) -> FloatArray:
+    """ln T less that of the line of its sample through the ``known`` pulls, at its own and at another load, (2, n)."""
+    left = np.empty((2, len(others_N)))
+    for rows, use in _of_each_sample(pulls, known):
+        load, force = pulls["load_N"][rows], np.exp(pulls["log_force"][rows])
+        both = np.concatenate([load, np.where(others_N[rows] > 0, others_N[rows], load)])
+        ratio = np.concatenate([force / load, force / load])
+        line = _median_line(1.0 / both, ratio, both, np.concatenate([use, np.zeros_like(use)])) * both
+        line = np.log(np.maximum(line, 1e-3 * float(np.median(force))))
+        left[:, rows] = np.log(force) - line.reshape(2, -1)
+    return left
 
 
 def _copied(table: pd.DataFrame) -> Iterator[Doubt]:
@@ -122,7 +201,8 @@ def _pulls_of(table: pd.DataFrame, regime: str) -> Pulls:
 def _split(pulls: Pulls, plausible: tuple[float, float]) -> tuple[np.ndarray, float]:
     """The wrong part of the pulls, (n,) of bool, where many cells fall into two parts, and ln of its factor.
 
-    Wrong is the part without which T/N is plausible, and the smaller one where both or none are.
+    Wrong is the part without which T/N is plausible; where both or none are, the one whose correction leaves less
+    beside the laws of the samples, and the smaller one where both leave as much, as where every cell is split.
     """
     low, high = np.zeros((2, len(pulls["log_force"])), bool)
     factors, several = [], 0
@@ -146,8 +226,11 @@ def _split(pulls: Pulls, plausible: tuple[float, float]) -> tuple[np.ndarray, fl
         samples = pulls["sample"]
         usual = [float(np.exp(np.median(log_ratio[samples == sample]))) for sample in np.unique(samples)]
         odd = not all(plausible[0] <= ratio <= plausible[1] for ratio in usual)
-        either.append((odd, int(wrong.sum()), wrong, log_factor))
-    _, _, wrong, log_factor = min(either, key=lambda found: found[:2])
+        left = float(np.abs(_beside_law(pulls, pulls["log_force"] - np.where(wrong, log_factor, 0.0))).mean())
+        either.append((odd, left, int(wrong.sum()), wrong, log_factor))
+    (odd, left, *_), (other_odd, other_left, *_) = either
+    by = 0 if odd != other_odd else 1 if abs(left - other_left) > AS_MUCH * max(left, other_left) else 2
+    *_, wrong, log_factor = min(either, key=lambda found: found[by])
     return wrong, log_factor
 
 
