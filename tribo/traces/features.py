@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -96,11 +97,13 @@ def features_of(trace: Trace, pull: Pull, speed_m_s: float | None = None) -> dic
         speed_m_s = speed_level_m_s(trace)
     speed = speed_m_s if speed_m_s and speed_m_s > 0 else math.nan
     found: dict[str, Feature] = {}
-    if math.isfinite(pull.static_N) and pull.onset_s < pull.peak_s:
-        pull = _with_highest(time, force, pull)
-        tau = _correlation_while_sliding(time, force, pull)
-        found |= _of_rise(time, force, pull, speed, tau) | _of_decay(time, force, pull, speed, tau)
-    found |= _of_slips(pull.slips) | _of_sliding(time, force, pull)
+    with suppress(ZeroDivisionError):  # of a recorder that stands still, to the bit, such features do not exist
+        if math.isfinite(pull.static_N) and pull.onset_s < pull.peak_s:
+            pull = _with_highest(time, force, pull)
+            tau = _correlation_while_sliding(time, force, pull)
+            found |= _of_rise(time, force, pull, speed, tau) | _of_decay(time, force, pull, speed, tau)
+    with suppress(ZeroDivisionError):
+        found |= _of_slips(pull.slips) | _of_sliding(time, force, pull)
     return {name: found[name] for name in FEATURES if name in found and math.isfinite(found[name].value)}
 
 
@@ -242,6 +245,8 @@ def _of_decay(time: FloatArray, force: FloatArray, pull: Pull, speed: float, tau
     if below > level:
         bent = np.gradient(course)
         slope *= float(bent[-1] / bent[near].mean())  # the rise may bend between there and the peak
+        if not slope > 0:
+            return found  # steps of the recorder: it stands still before the peak
         rising, slope_u = _WIDTH_AT * drop / slope, math.sqrt(stretched / float(reach @ reach))
         width = rising + length_s * math.log((top_N - level) / (below - level))
         u = math.hypot(rising * slope_u / slope, rising * top_u / drop, (width - rising) * length_u / length_s)
