@@ -41,6 +41,7 @@ from tribo.workbook_sheets import MOST_MEMORY_BYTES
 LARGEST_EXPORT_BYTES = 2 << 30
 LARGEST_TABLE_BYTES = 100_000_000  # tests.csv, overrides.csv
 LARGEST_DESCRIPTION_BYTES = 1_000_000  # campaign.toml, a design file
+MOST_DROPPED_BYTES = 50_000_000_000  # all files of a campaign of a build: to hash them takes minutes
 LONGEST_NAME = 150  # characters of a campaign folder: files named after it stay below the 255 bytes of file systems
 
 # Tables

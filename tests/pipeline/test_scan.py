@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from tribo.errors import CampaignError
 from tribo.site import scan as scanning
 from tribo.site.scan import UPLOAD_SUFFIXES, difference, scan
 
@@ -93,10 +92,30 @@ def test_a_half_uploaded_archive_waits_and_a_whole_one_is_a_campaign(drop: Path)
     assert (found["c"].waiting, list(found["c"].files)) == ((), ["c.zip"])
 
 
-def test_two_campaigns_of_one_name_are_refused(drop: Path) -> None:
+def test_two_campaigns_of_one_name_are_refused_and_the_others_are_built(drop: Path) -> None:
     (drop / "a.zip").write_bytes(b"PK")
-    with pytest.raises(CampaignError, match="have the same name"):
-        scan(drop, 0.0)
+    (drop / "b.zip").write_bytes(b"PK")
+    found = {c.name: c for c in scan(drop, 0.0)}
+    assert list(found) == ["a", "a.zip", "b"]
+    assert [c.is_ready for c in found.values()] == [False, False, True]
+    assert all("rename one of them" in found[name].refused[0] for name in ("a", "a.zip"))
+
+
+def test_names_that_look_the_same_have_a_row_each(drop: Path) -> None:
+    for name in (b"\xff", b"\xfe", b"\xfd"):
+        os.mkdir(os.fsencode(drop) + b"/" + name)
+    found = scan(drop, 0.0)
+    assert len({c.name for c in found}) == len(found) == 4
+    assert [c.is_ready for c in found].count(True) == 1
+
+
+def test_a_campaign_of_holes_is_refused_before_it_is_read(drop: Path) -> None:
+    with (drop / "a" / "raw" / "T2.csv").open("wb") as out:
+        out.truncate(8 << 40)
+    (drop / "b.zip").touch()
+    os.truncate(drop / "b.zip", 8 << 40)
+    for campaign in scan(drop, 0.0):
+        assert "at most 50000000000 are allowed" in campaign.refused[0]
 
 
 def test_overrides_beside_a_campaign_belong_to_it(drop: Path) -> None:

@@ -7,14 +7,15 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tribo.errors import CampaignError, Problem, TriboError, naming, system_problem
 from tribo.files import LEADS_OUT, bytes_of, found_below, found_in, leads_out, paths_below, text_of, write_text
-from tribo.input_files import LONGEST_NAME
+from tribo.input_files import LONGEST_NAME, MOST_DROPPED_BYTES
 from tribo.user_text import is_control, well_formed
 
 # how copying programs and browsers name a file that is not whole yet
@@ -59,21 +60,29 @@ def scan(drop: Path, settle_s: float = 60.0) -> tuple[Dropped, ...]:
     """Every campaign of a drop folder, by name.
 
     A folder is one campaign, and so is a .zip. A file changed less than ``settle_s`` seconds ago, one that changes
-    while it is read, and one whose name says that it is being uploaded is not whole yet.
+    while it is read, and one whose name says that it is being uploaded is not whole yet. Two campaigns of one name
+    ("a" and "a.zip") are both refused, and listed under names of their own.
 
     Raises
     ------
     CampaignError
-        Two campaigns of one name ("a" and "a.zip"), or no such folder.
+        No such folder.
     """
     if not drop.is_dir():
         raise CampaignError(Problem("missing", "this folder does not exist", file=str(drop)))
     found = [_looked_at(path, settle_s) for path in sorted(drop.iterdir()) if _is_campaign(path)]
-    names = [campaign.name for campaign in found]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        what = "a folder and a .zip have the same name; rename one of them"
-        raise CampaignError(Problem("duplicate_campaign", what, file=str(drop), found=name) for name in twice)
+    often = Counter(campaign.name for campaign in found)
+    taken = {name for name, times in often.items() if times == 1}
+    for k, campaign in enumerate(found):
+        if often[campaign.name] == 1:
+            continue
+        name, number = well_formed(campaign.path.name), 1
+        while name in taken:
+            number += 1
+            name = f"{campaign.name} ({number})"
+        taken.add(name)
+        what = "this name is that of another campaign, a folder or a .zip; rename one of them"
+        found[k] = replace(campaign, name=name, waiting=(), refused=(*campaign.refused, what))
     return tuple(found)
 
 
@@ -116,13 +125,18 @@ def _look(path: Path, settle_s: float) -> Dropped:
         return Dropped(path.stem if path.suffix.lower() == ".zip" else path.name, path, waiting=(LEADS_OUT,))
     if path.is_file():
         name = path.stem if not _uploading(path.name) else path.name
+        if too_much := _too_much([path]):
+            return Dropped(name, path, refused=(too_much,))
         why = _not_whole(path, settle_s)
         if why:
             return Dropped(name, path, waiting=(f"{path.name} {why}",))
         digest, changed = _hashed(path)
         return Dropped(name, path, {path.name: digest}, (f"{path.name} is still being written",) if changed else ())
     files, waiting = {}, []
-    for file, outward in _files(path):
+    below = list(_files(path))
+    if too_much := _too_much([file for file, outward in below if not outward]):
+        return Dropped(path.name, path, refused=(too_much,))
+    for file, outward in below:
         shown = well_formed(file.relative_to(path).as_posix())
         if outward:
             files[shown] = _LINK
@@ -170,12 +184,18 @@ def _not_whole(file: Path, settle_s: float) -> str:
     return f"changed less than {settle_s:g} s ago" if age < settle_s else ""
 
 
+def _too_much(files: Iterable[Path]) -> str:
+    """Why files are not read at all, as a sentence; empty where they are. A file of holes may have any size."""
+    size = sum(file.stat().st_size for file in files)
+    return f"its files have {size} bytes; at most {MOST_DROPPED_BYTES} are allowed" if size > MOST_DROPPED_BYTES else ""
+
+
 def _hashed(file: Path) -> tuple[str, bool]:
-    """SHA-256 of a file, and whether the file changed meanwhile."""
+    """SHA-256 of a file as long as it was at first, and whether the file changed meanwhile."""
     digest = hashlib.sha256()
     with naming(file), file.open("rb") as stream:
         before = os.fstat(stream.fileno())
-        while chunk := stream.read(_CHUNK):
+        while (left := before.st_size - stream.tell()) > 0 and (chunk := stream.read(min(left, _CHUNK))):
             digest.update(chunk)
     after = file.stat()
     return digest.hexdigest(), (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns)
