@@ -87,8 +87,8 @@ def test_a_force_that_stands_still_to_the_bit_has_neither_roughness_nor_a_freque
     assert not {"roughness", "main_frequency_Hz", "main_share"} & set(found)
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("step_share", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("step_share", [0.02, 0.1, 0.44, 0.5])
 def test_a_recorder_with_coarse_steps_leaves_finite_features_or_none(seed: int, step_share: float) -> None:
     time, force, _ = pull_from_rest(FromRest(noise=0.0005, drops=seed % 3), seed)
     step = step_share * float(force.max())
