@@ -194,7 +194,7 @@ def next_test_of(
     best = named.causes[-1][0]
     others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
     certain = weights_of([best, *others])[0] >= CERTAIN
-    return (settling_test(best) if certain else None) or next_test([best, *others], certain=certain)
+    return (settling_test(best) if certain else None) or next_test([best, *others], is_named=True)
 
 
 def settling_test(cause: CauseCandidate) -> NextTest | None:
@@ -207,19 +207,19 @@ def settling_test(cause: CauseCandidate) -> NextTest | None:
     return next(filter(None, tests), first_test_of(cause.fit, column) if alone else None)
 
 
-def next_test(tied: Sequence[CauseCandidate], *, certain: bool = False) -> NextTest | None:
+def next_test(tied: Sequence[CauseCandidate], *, is_named: bool = False) -> NextTest | None:
     """The test with the most expected bits per hour between the two best of ``tied``; None for fewer than two.
 
     Options: the amplitude of one of the two is measured; pulls of the most affected sample are repeated with one of
     the two removed (cavities vented, wire lowered); more pulls are made of one sample at one load, also half the lowest
-    and twice the highest measured. Where the first is ``certain``, nothing of the second is measured or removed: that
-    would tell nothing new of the first.
+    and twice the highest measured. Where the first ``is_named`` alone, nothing of the second is measured or removed: a
+    verdict that named another cause before the measurement would seldom say more after it.
     """
     if len(tied) < 2:
         return None
     first, second = tied[0], tied[1]
     separates = first.name, second.name
-    tried = (first,) if certain else (first, second)
+    tried = (first,) if is_named else (first, second)
     options = [test for make in (_measuring, _removing) for c in tried if (test := make(c, separates))]
     conditions = first.fit.setup.observations.conditions
     loads = np.unique(np.round(conditions.normal_load_N, 5))
