@@ -75,7 +75,7 @@ def test_with_the_model_few_tests_one_load_or_one_sample_cannot_tell(few: Ingest
     found: Verdict = tribo.diagnose(few).verdict
     assert found.verdict == "cannot_tell"
     assert reason in found.sentence
-    assert "at least 12 pulls, 2 loads and 2 samples" in card_text(card_of(tribo.Study(few, ()), found))
+    assert "at least 12 tests, 2 loads and 2 samples" in card_text(card_of(tribo.Study(few, ()), found))
 
 
 def test_columns_of_too_few_tests_are_not_said_to_be_tested(tmp_path: Path) -> None:
