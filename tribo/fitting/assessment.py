@@ -38,6 +38,7 @@ from tribo.fitting.linear import (
     weights_of,
 )
 from tribo.fitting.samples import fit_samples
+from tribo.fitting.siblings import MOST_ALONE
 from tribo.laws import design_over_load
 from tribo.records import MEDIAN_TO_SD, REGIMES, FloatArray, Ingested, LawFit, Regime
 
@@ -282,9 +283,6 @@ def power_sentences(power: pd.DataFrame) -> list[str]:
 
 
 OUTLYING = ["kind", "name", "sample", "regime", "deviation_pct", "score", "limit"]
-
-
-MOST_ALONE = 5  # sentences about single pulls of one sample; more are told together
 
 
 def outlying_sentences(outlying: pd.DataFrame) -> list[str]:

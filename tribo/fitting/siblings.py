@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tribo.fits import REGIMES
-from tribo.fitting.linear import levels_of
+from tribo.fitting.linear import SAME_LOAD, levels_of
 from tribo.records import Campaign, Doubt, FloatArray, Ingested
 
 BoolArray = NDArray[np.bool_]
@@ -27,10 +27,9 @@ SPLIT = 5.0  # ratio between equal pulls that no scatter of repeats or specimens
 FEWEST_SPLIT, LEAST_SPLIT = 3, 0.25  # cells, and the share of all, that a slip of many exports splits
 LOADS_APART = 0.1  # by which two loads differ, as ln, at the least: the line of loads that are alike leads anywhere
 FEWEST_LEVELS = 3  # of load, beyond which a power is told from a line
-SAME_LOAD = 0.02
 FEWEST_MOVED, MOVED_LEFT = 4, 0.4  # tests in a block of moved loads, and the share that is left when put back
 MOST_NAMED = 3
-MOST_ALONE = 5  # doubts about single pulls of one sample that are off the same way; more are told together
+MOST_ALONE = 5  # single pulls of one sample that are off the same way; more are told together
 NEARLY_ALL, HARDLY_ANY = 0.9, 0.1  # shares of the tests that are off, and of the others, with one value of a column
 FEWEST_COPIED, COPIED_SHARE, COPIED_DIGITS = 3, 0.25, 3  # pairs of forces with so many digits, equal by chance hardly
 FACTORS = {10.0: "ten", 100.0: "a hundred", 1000.0: "a thousand"}
@@ -97,9 +96,9 @@ def _moved(campaign: Campaign, table: pd.DataFrame) -> tuple[Doubt, pd.DataFrame
     stated = [t.test_id for t in campaign.tests]
     loads = pd.Series([t.normal_load_N for t in campaign.tests], stated)
     best: tuple[float, int, int, int] = (0.0, 0, 0, 0)
-    for step in (1, -1):
-        theirs = loads.shift(-step)
-        off, beside = _beside_laws(table, theirs)
+    next_N, before_N = loads.shift(-1), loads.shift(1)
+    off, with_next, with_before = _beside_laws(table, next_N, before_N)
+    for step, theirs, beside in ((1, next_N, with_next), (-1, before_N, with_before)):
         changed = (~np.isclose(loads, theirs, rtol=SAME_LOAD)) & np.isfinite(theirs.to_numpy())
         total = np.concatenate([[0.0], np.cumsum(np.where(changed, np.nan_to_num(off - beside), 0.0))])
         last = int(np.argmax(total - np.minimum.accumulate(total)))
@@ -130,35 +129,42 @@ def _moved(campaign: Campaign, table: pd.DataFrame) -> tuple[Doubt, pd.DataFrame
     return doubt, mended
 
 
-def _beside_laws(table: pd.DataFrame, theirs_N: pd.Series) -> tuple[FloatArray, FloatArray]:
-    """How far ln T of each test lies from the line of its sample, at its own load and at that of ``theirs_N``, by name.
+def _beside_laws(table: pd.DataFrame, *others_N: pd.Series) -> FloatArray:
+    """How far ln T of each test lies from the line of its sample, at its own load and at k ``others_N``, (1 + k, n).
 
     The larger of both regimes; nan where there is no force.
     """
-    found = np.full((2, len(theirs_N)), np.nan)
+    index = others_N[0].index
+    found = np.full((1 + len(others_N), len(index)), np.nan)
     for regime in REGIMES:
         pulls = _pulls_of(table, regime)
         names = pulls["test_id"]
         if len(names) < 6:
             continue
-        at, known = theirs_N.index.get_indexer(pd.Index(names)), np.ones(len(names), bool)
+        at, known = index.get_indexer(pd.Index(names)), np.ones(len(names), bool)
+        loads = np.array([other[names].to_numpy(float) for other in others_N])
         for _ in range(2):  # once more without those that the first laws find far off
-            both = np.abs(_beside_line_at(pulls, theirs_N[names].to_numpy(float), known))
-            known = both[0] < max(3.0 * float(np.median(both[0])), math.log(LEAST_RATIO))
-        found[:, at] = np.fmax(found[:, at], both)
-    return found[0], found[1]
+            left = np.abs(_beside_line_at(pulls, loads, known))
+            known = left[0] < max(3.0 * float(np.median(left[0])), math.log(LEAST_RATIO))
+        found[:, at] = np.fmax(found[:, at], left)
+    return found
 
 
 def _beside_line_at(pulls: Pulls, others_N: FloatArray, known: BoolArray) -> FloatArray:
-    """ln T less that of the line of its sample through the ``known`` pulls, at its own and at another load, (2, n)."""
-    left = np.empty((2, len(others_N)))
+    """ln T less that of the line of its sample through the ``known`` pulls, at its own load and at others, (1 + k, n).
+
+    ``others_N`` are k loads of each pull, (k, n).
+    """
+    left = np.empty((1 + len(others_N), len(known)))
     for rows, use in _of_each_sample(pulls, known):
         load, force = pulls["load_N"][rows], np.exp(pulls["log_force"][rows])
-        both = np.concatenate([load, np.where(others_N[rows] > 0, others_N[rows], load)])
-        ratio = np.concatenate([force / load, force / load])
-        line = _median_line(1.0 / both, ratio, both, np.concatenate([use, np.zeros_like(use)])) * both
+        others = others_N[:, rows]
+        every = np.concatenate([load, np.where(others > 0, others, load).ravel()])
+        ratio = np.tile(force / load, len(left))
+        fitted = np.concatenate([use, np.zeros(others.size, bool)])
+        line = _median_line(1.0 / every, ratio, every, fitted) * every
         line = np.log(np.maximum(line, 1e-3 * float(np.median(force))))
-        left[:, rows] = np.log(force) - line.reshape(2, -1)
+        left[:, rows] = np.log(force) - line.reshape(len(left), -1)
     return left
 
 
