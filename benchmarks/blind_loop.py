@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from blind_cases import Case, true_parameter
 
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
+import pandas as pd  # isort: skip
 from blind.direct import ingested  # isort: skip
 from blind.tribometer import Bench, hide, with_further  # isort: skip
 
@@ -67,13 +68,18 @@ def measurement(case: Case, design: Mapping[str, Any], number: int) -> tuple[flo
 
 
 def with_pulls(bench: Bench, case: Case, design: Mapping[str, Any]) -> Bench:
-    """The bench with the pulls that a design asks for: of one sample at one load, or tests again without a cause."""
+    """The bench with the pulls that a design asks for: of samples at loads in turn, or tests again without a cause."""
     tests = bench.tests
     if "without" in design:
         rows = tests.set_index("test_id").loc[design["repeat_tests"]].reset_index().assign(without=design["without"])
     else:
-        rows = tests[tests["sample"] == design["sample"]]
-        rows = rows.iloc[np.resize(np.arange(len(rows)), design["pulls"])].assign(N=design["normal_load_N"])
+        samples = design["samples"] if "samples" in design else [design["sample"]]
+        loads = design["normal_loads_N"] if "normal_loads_N" in design else [design["normal_load_N"]]
+        each = [tests[tests["sample"] == name] for name in samples]
+        pairs = [(k, load) for load in loads for k in range(len(each))]  # every sample at every load, in turn
+        turns = [pairs[number % len(pairs)] for number in range(design["pulls"])]
+        rows = pd.DataFrame([each[k].iloc[number // len(each) % len(each[k])] for number, (k, _) in enumerate(turns)])
+        rows = rows.assign(N=[load for _, load in turns])
     return with_further(bench, rows, case.seed, list(case.effects), case.design)
 
 

@@ -161,7 +161,7 @@ class Laboratory:
         design, made = test.design, len(self.bench.tests)
         if "measure" in design:
             self.measured[design["measure"]] = self._measurement(design)
-        elif test.kind in ("remove", "pull further"):
+        elif test.kind in ("remove", "pull further", "pull more"):
             self.bench = with_pulls(self.bench, self.case, design)
         elif test.kind == "measure more":
             self.case = replace(self.case, design=design_for(pattern_error=WELL, specimen_slope=SLOPE))

@@ -31,6 +31,7 @@ from tribo.diagnostics.planning import (
     narrowing_pulls,
     next_test,
     settling_test,
+    width_left,
 )
 from tribo.diagnostics.scatter import first_noise
 from tribo.diagnostics.score_statistics import start_effects
@@ -236,6 +237,48 @@ def test_a_load_error_without_a_rival_is_measured_and_suction_is_removed() -> No
     assert vented is not None
     assert (weighed.kind, weighed.separates) == ("measure", ("normal_load_error",))
     assert (vented.kind, vented.design["without"]) == ("remove", "suction")
+
+
+def named_alone(name: str, *values: float) -> CauseCandidate:
+    """A mechanism in a campaign made with it."""
+    c = made(acting(name, *values), seed=6)
+    others = {a.name for a in candidates(setup_of(c), LAW)} - {name}
+    (cause,) = weigh(start_effects(baseline(c)), others)
+    return cause
+
+
+def test_further_pulls_narrow_the_size_of_a_cause_and_more_of_them_narrow_it_more() -> None:
+    cause = named_alone("pressure_dependent_friction", 0.3)
+    loads, samples = (0.3, 3.0), ("A", "B")
+    left = [width_left(cause, samples, loads, pulls) for pulls in (0, 6, 18, 72)]
+    assert left[0] == 1.0
+    assert left == sorted(left, reverse=True)
+    assert left[-1] < 0.9
+
+
+def test_a_cause_that_nothing_measures_or_removes_is_narrowed_at_loads_beyond_the_measured() -> None:
+    test = settling_test(named_alone("pressure_dependent_friction", 0.3))
+    assert test is not None
+    assert (test.kind, test.separates) == ("pull more", ("pressure_dependent_friction",))
+    low, high = test.design["normal_loads_N"]
+    loads = [t.normal_load_N for t in campaign().campaign.tests]
+    assert low == pytest.approx(min(loads) / 2)
+    assert high == pytest.approx(max(loads) * 2)
+    assert 0.0 < test.design["share_of_width"] <= 0.8
+    assert "shared equally and in random order" in next_test_sentence(test)
+
+
+def test_a_cause_that_pulls_of_any_number_do_not_narrow_is_tested_with_what_was_held_fixed() -> None:
+    cause = named_alone("edge_adhesion", 0.1, 0.5)
+    sizes = cause.fit.noise.sizes.copy()
+    sizes[PATTERN] = 3.0  # the model is known to be three times as wrong about patterns as it says
+    test = settling_test(replace(cause, fit=replace(cause.fit, noise=replace(cause.fit.noise, sizes=sizes))))
+    assert test is not None
+    assert test.kind == "vary what was fixed"
+    assert test.separates == ("edge_adhesion", "velocity_dependence", "contact_ageing")
+    assert test.design["sample"] == "B"  # that with the longest rims of this design
+    assert test.design["share_of_width"] > 0.8
+    assert next_test_sentence(test).startswith("Vary the pull speed over")
 
 
 def test_two_columns_that_act_together_are_varied_each_with_each() -> None:

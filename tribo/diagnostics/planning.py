@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import block_diag
 
-from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named, weights_of
+from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named
 from tribo.diagnostics.fit import ModelFit, scored, solved, state_at
 from tribo.diagnostics.model import Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
-from tribo.diagnostics.observations import NO_FLAT, Observations, conditions_of
+from tribo.diagnostics.observations import BREAK_S, NO_FLAT, Observations, conditions_of
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.scatter import SIZE_PRIORS, Noise
 from tribo.diagnostics.score_statistics import start_effects
@@ -36,7 +36,6 @@ PULLS = 18
 NARROWER = 0.8  # of the width of an interval: what further pulls leave of it
 MOST_PULLS = 72  # one long day
 PLACES = {1: np.array([-1.0, 0.0, 1.0]), 2: np.array([-1.0, 1.0])}  # of a column varied alone, of two together
-CERTAIN = 0.99  # share of a cause beside its rivals from which a test between them would tell next to nothing
 CHOSEN: dict[str, Literal["ratio", "interval"]] = {  # conditions that can be set, with their scale
     "speed_m_s": "ratio", "hold_s": "ratio", "temperature_C": "interval", "humidity_pct": "interval",
 }  # fmt: skip
@@ -192,35 +191,31 @@ def next_test_of(
         if len(alike) > 1:
             return next_test(alike)
     best = named.causes[-1][0]
-    others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
-    certain = weights_of([best, *others])[0] >= CERTAIN
-    return (settling_test(best) if certain else None) or next_test([best, *others], is_named=True)
+    return next_test([best, *named.rivals]) or settling_test(best)
 
 
 def settling_test(cause: CauseCandidate) -> NextTest | None:
-    """For a cause without a rival, a test of the cause itself: values of its column that were not measured, its
-    amplitude measured directly, pulls without it, or its column varied alone; None where only loads could tell more."""
+    """For a cause that is named alone, a test of the cause itself: values of its column that were not measured, its
+    amplitude measured directly, pulls without it, its column varied alone, or pulls that narrow its size."""
     own = (cause.name,)
     column = cause.acting.mechanism.column(cause.acting.choice)
     alone = column in ("specimen_run", *cause.fit.setup.observations.conditions.columns)
     tests = confirming_test(cause), _measuring(cause, own), _removing(cause, own)
-    return next(filter(None, tests), first_test_of(cause.fit, column) if alone else None)
+    return next(filter(None, tests), first_test_of(cause.fit, column) if alone else narrowing_test(cause))
 
 
-def next_test(tied: Sequence[CauseCandidate], *, is_named: bool = False) -> NextTest | None:
+def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
     """The test with the most expected bits per hour between the two best of ``tied``; None for fewer than two.
 
     Options: the amplitude of one of the two is measured; pulls of the most affected sample are repeated with one of
     the two removed (cavities vented, wire lowered); more pulls are made of one sample at one load, also half the lowest
-    and twice the highest measured. Where the first ``is_named`` alone, nothing of the second is measured or removed: a
-    verdict that named another cause before the measurement would seldom say more after it.
+    and twice the highest measured.
     """
     if len(tied) < 2:
         return None
     first, second = tied[0], tied[1]
     separates = first.name, second.name
-    tried = (first,) if is_named else (first, second)
-    options = [test for make in (_measuring, _removing) for c in tried if (test := make(c, separates))]
+    options = [test for make in (_measuring, _removing) for c in (first, second) if (test := make(c, separates))]
     conditions = first.fit.setup.observations.conditions
     loads = np.unique(np.round(conditions.normal_load_N, 5))
     for name in np.unique(conditions.sample):
@@ -235,6 +230,74 @@ def next_test(tied: Sequence[CauseCandidate], *, is_named: bool = False) -> Next
                 NextTest("pull further", separates, design, bits(_distance2(first.fit, difference, rows)))
             )
     return max(options, key=lambda option: option.expected_bits / float(option.design["hours"]))
+
+
+def narrowing_test(cause: CauseCandidate) -> NextTest:
+    """Further pulls that narrow the interval of a cause's size: of one sample or of all, at an end of the measured
+    loads or at both, also at half the lowest and twice the highest; the best of these, of PULLS or, where these do not
+    leave at most NARROWER of the width, of more.
+
+    Where not even MOST_PULLS do, since the error of the model for the patterns or the specimens limit the size, what
+    was held fixed is varied, if anything was, on the sample that the cause changes most.
+    """
+    c = cause.fit.setup.observations.conditions
+    loads = np.unique(c.normal_load_N)
+    every = tuple(map(str, np.unique(c.sample)))
+    low, high = float(loads[0]), float(loads[-1])
+    places = [(samples, chosen) for samples in (*((name,) for name in every), every)
+              for chosen in ((low,), (high,), (low, high), (low / 2, high * 2))]  # fmt: skip
+    samples, chosen = min(places, key=lambda place: width_left(cause, place[0], place[1], PULLS))
+    for pulls in range(PULLS, MOST_PULLS + 1, PULLS):
+        left = width_left(cause, samples, chosen, pulls)
+        if left <= NARROWER:
+            break
+    strongest, flat = most_changed(cause), cause.fit.setup.observations.flat
+    if left > NARROWER and (wider := widening_test(c, strongest if strongest != flat else "")) is not None:
+        design = {**wider.design, "share_of_width": left}
+        return replace(wider, separates=(cause.name, *wider.separates), design=design)
+    design = {"samples": list(samples), "normal_loads_N": list(chosen), "pulls": pulls, "hours": pulls * HOURS_PER_PULL,
+              "share_of_width": left}  # fmt: skip
+    return NextTest("pull more", (cause.name,), design)
+
+
+def most_changed(cause: CauseCandidate) -> str:
+    """The sample whose ln T a cause changes most on average."""
+    sample = cause.fit.setup.observations.conditions.sample
+    change = np.abs(effect_of(cause.fit.setup, cause.fit.law, cause.acting, cause.values))
+    return max(np.unique(sample).tolist(), key=lambda name: float(change[sample == name].mean()))
+
+
+def width_left(cause: CauseCandidate, samples: Sequence[str], loads: Sequence[float], pulls: int) -> float:
+    """Which share of the standard error of a cause's size is left once so many further pulls were made, in a session of
+    their own, at these loads in turn on the specimens of these samples."""
+    before, after = (_size_error(cause, samples, loads, number) for number in (0, pulls))
+    return after / before if before > 0 else 1.0
+
+
+def _size_error(cause: CauseCandidate, samples: Sequence[str], loads: Sequence[float], pulls: int) -> float:
+    """The standard error of a cause's size with so many further pulls that come out as expected."""
+    f = cause.fit
+    o = f.setup.observations
+    there = np.flatnonzero(np.isin(o.conditions.sample, list(samples)))
+    spread = there[np.linspace(0, len(there) - 1, pulls).astype(int)]
+    both = o.take(np.concatenate([np.arange(o.n), spread]))
+    c = both.conditions
+    load, new = c.normal_load_N.copy(), np.arange(o.n, o.n + pulls)
+    load[new] = np.resize(np.array(loads), pulls)
+    later = {name: getattr(c, name).copy() for name in ("specimen_run", "run_order", "elapsed_s")}
+    for name, step in (("specimen_run", 1.0), ("run_order", 1.0), ("elapsed_s", 3600.0 * HOURS_PER_PULL)):
+        first = np.max(later[name][: o.n]) + (BREAK_S if name == "elapsed_s" else 0.0)
+        later[name][new] = first + step * np.arange(1, pulls + 1)
+    both = replace(both, conditions=replace(c, normal_load_N=load, **later))
+    s = setup(both, f.setup.predictor)
+    target, x = Target(s, f.acting), np.concatenate([f.law, *f.values])
+    expected = target.predict(x)
+    s = replace(s, observations=replace(both, log_force=expected))
+    state = state_at(s, x, np.zeros(s.n_effects), np.zeros_like(expected), f.noise)
+    columns = model_columns(target.jacobian(x, expected), s)
+    inverse, _ = solved(state, columns, np.ones(len(expected)), target.bounds)
+    size = columns.parameters - len(cause.values)
+    return float(np.sqrt(inverse.border[0, size, size]))
 
 
 def _measuring(candidate: CauseCandidate, separates: tuple[str, ...]) -> NextTest | None:
@@ -256,9 +319,8 @@ def _removing(candidate: CauseCandidate, separates: tuple[str, ...]) -> NextTest
     if not candidate.acting.mechanism.removed_by:
         return None
     change = effect_of(f.setup, f.law, candidate.acting, candidate.values)
-    sample = f.setup.observations.conditions.sample
-    strongest = max(set(sample.tolist()), key=lambda name: np.abs(change[sample == name]).mean())
-    rows = np.flatnonzero(sample == strongest)
+    strongest = most_changed(candidate)
+    rows = np.flatnonzero(f.setup.observations.conditions.sample == strongest)
     rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
     test_ids = [str(name) for name in f.setup.observations.test_ids[rows]]
     design: dict[str, Any] = {"without": candidate.acting.mechanism.name, "sample": strongest, "repeat_tests": test_ids}
@@ -278,7 +340,7 @@ def confirming_test(cause: CauseCandidate) -> NextTest | None:
     if not column:
         return None
     change = np.abs(effect_of(f.setup, f.law, acting, cause.values))
-    sample = max(np.unique(c.sample).tolist(), key=lambda name: change[c.sample == name].mean())
+    sample = most_changed(cause)
     rows = np.resize(np.flatnonzero(c.sample == sample), PULLS)
     recorded = np.unique(c.recorded(column))
     recorded = recorded[np.isfinite(recorded)]
@@ -290,7 +352,7 @@ def confirming_test(cause: CauseCandidate) -> NextTest | None:
     regime = int(np.argmax(change.mean(axis=0)))
     percent = 100.0 * float(np.expm1((high - low)[:, regime].mean()))
     design = {
-        "covariate": column, "values": further.tolist(), "sample": str(sample), "regime": REGIMES[regime],
+        "covariate": column, "values": further.tolist(), "sample": sample, "regime": REGIMES[regime],
         "expected_percent": percent, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL,
     }  # fmt: skip
     return NextTest("confirm", (cause.name,), design, bits(_distance2(f, beyond - ended, rows)))

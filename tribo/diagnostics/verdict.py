@@ -31,7 +31,7 @@ UNTESTED: frozenset[Why] = frozenset(
 )
 # what a further test does
 NextKind = Literal[
-    "measure", "remove", "confirm", "pull further", "vary one column", "vary what was fixed", "part laws",
+    "measure", "remove", "confirm", "pull further", "pull more", "vary one column", "vary what was fixed", "part laws",
     "part columns", "factorial", "part from load", "at the bench", "measure more",
 ]  # fmt: skip
 CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes

@@ -383,6 +383,10 @@ def next_test_sentence(t: NextTest) -> str:
         return f"{sentence_case(mechanism(design['without']).removed_by)}: {pulls} pulls of {design['sample']}."
     if t.kind == "pull further":
         return f"{pulls} further pulls of {design['sample']} at {design['normal_load_N']:.3g} N."
+    if t.kind == "pull more":
+        loads, samples = design["normal_loads_N"], design["samples"]
+        shared = ", shared equally and in random order" if len(loads) * len(samples) > 1 else ""
+        return f"{pulls} further pulls of {joined(samples)} at {joined([f'{load:.3g}' for load in loads])} N{shared}."
     if t.kind == "confirm":
         words = described(str(design["covariate"]))
         values = joined([f"{value * words.factor:.3g}" for value in design["values"]])

@@ -470,6 +470,10 @@ def why_next(v: Verdict) -> str:
         return "with fewer, nothing can be told from chance"
     if not separates:
         return "with fewer, what else friction varies with cannot be told"
+    if v.next_test is not None and "share_of_width" in v.next_test.design and len(separates) > 1:
+        cause, *others = map(name_in_words, separates)
+        untested = f"this campaign could not test {joined(others)}"
+        return f"{untested}; pulls under the same conditions would hardly narrow the size of {cause}"
     if v.next_test is not None and v.next_test.kind == "vary what was fixed":
         return f"this campaign could not test {joined(list(map(name_in_words, separates)))}"
     if v.next_test is not None and v.next_test.kind == "confirm":
@@ -481,6 +485,9 @@ def why_next(v: Verdict) -> str:
         return f"{name_in_words(separates[0])} predicts {change} in {over}"
     if v.next_test is not None and len(separates) == 1 and v.next_test.kind in ("measure", "remove"):
         return f"it settles whether {name_in_words(separates[0])} is the cause"
+    if v.next_test is not None and v.next_test.kind == "pull more":
+        left = 100.0 * v.next_test.design["share_of_width"]
+        return f"the interval of the size of {name_in_words(separates[0])} narrows to about {left:.0f} % of its width"
     alone = v.next_test is not None and v.next_test.kind in ("vary one column", "factorial")
     if alone or (v.verdict == "unknown" and not of_kind(v, "law")):
         return f"to see whether friction follows {joined(list(map(in_words, separates)))} when nothing else changes"
