@@ -3,11 +3,12 @@
     python benchmarks/environments.py run  out/environments.jsonl [--count 200] [--seed 1] [--jobs 2]
     python benchmarks/environments.py page out/environments.jsonl     the counts into docs/results/environments.md
 
-Every environment is a fresh process: `tribo report` of a small zipped campaign, with two simulations a sample. First
-all settings alone, then two or three drawn together with a processor (the kernels of OpenBLAS and the instructions that
-numpy and numba may use). Counted is whether every file of the output folder is that of an undisturbed run, byte by byte
-but for times and the command; else whether the exit status says so and the words are sentences without a traceback. The
-date of the outputs is fixed by SOURCE_DATE_EPOCH, but where a setting takes that away. Linux only.
+Every environment is a fresh process: `tribo fit` of a small zipped campaign, in every fifth `tribo report` with two
+simulations a sample. First all settings alone, then two drawn together with a processor (the kernels of OpenBLAS and
+the instructions that numpy and numba may use). Counted is whether every file of the output folder is that of an
+undisturbed run, byte by byte but for times and the command; else whether all words and, to six digits, all numbers are;
+else whether the exit status says so and the words are sentences without a traceback. The date of the outputs is fixed
+by SOURCE_DATE_EPOCH, but where a setting takes that away. Linux only.
 """
 
 from __future__ import annotations
@@ -37,12 +38,19 @@ from run_lines import read_rows, work_off  # noqa: E402
 PAGE = ROOT / "docs" / "results" / "environments.md"
 DATA = ROOT / "docs" / "data" / "environments.jsonl"
 MARK = "<!-- below: python benchmarks/environments.py page -->"
-COMMAND = ("report", "campaign.zip", "-o", "out", "--runs", "2", "--jobs", "1", "-q")
+FIT = ("fit", "campaign.zip", "-o", "out", "-q")
+REPORT = ("report", "campaign.zip", "-o", "out", "--runs", "2", "--jobs", "1", "-q")
+EVERY_FIFTH = 5
 LONGEST_S = 600.0
 EPOCH = "1790000000"
 MB = 1 << 20
 # what says a command and is not a result: the command line, versions and the machine of the run
-RECORDS = ("record.json", "ro-crate-metadata.json", "provenance.json")
+RECORDS = ("ro-crate-metadata.json", "provenance.json")
+CLOSE = 1e-6  # relative, of two numbers
+NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+# what follows from the bytes of something else: hashes, embedded pictures, names of parts of a picture
+DERIVED = re.compile(r"data:[a-z/+]+;base64,[A-Za-z0-9+/=]+|[0-9a-f]{64}|\b[pmh][0-9a-f]{10}\b|sha\d+-[A-Za-z0-9+/=]+")
+TEXTS = (".csv", ".json", ".html", ".svg", ".md", ".txt", ".toml")
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ def _variables(kind: str, name: str, *values: str | None) -> Iterator[Setting]:
 
 def processors() -> list[Setting]:
     """Kernels of OpenBLAS, and instructions that are held back."""
-    kernels = ("Prescott", "Nehalem", "Sandybridge", "Haswell", "SkylakeX")
+    kernels = ("Prescott", "Nehalem", "Sandybridge", "Haswell", "Zen")  # others need instructions that many have not
     found = list(_variables("processor", "OPENBLAS_CORETYPE", *kernels))
     found += _variables("processor", "NPY_DISABLE_CPU_FEATURES", "AVX2 FMA3", "AVX512F AVX512CD AVX512_SKX")
     found += _variables("processor", "NUMBA_CPU_NAME", "generic", "nocona")
@@ -126,6 +134,10 @@ class Trial:
     settings: tuple[Setting, ...]
 
     @property
+    def command(self) -> tuple[str, ...]:
+        return REPORT if self.number % EVERY_FIFTH == 0 else FIT
+
+    @property
     def name(self) -> str:
         return " + ".join(s.name for s in self.settings) or "nothing"
 
@@ -158,7 +170,7 @@ def in_environment(trial: Trial, campaign: Path, folder: Path) -> dict[str, Any]
             variables.pop(name, None)
             if value is not None:
                 variables[name] = value
-    start = f"{sys.executable} -m tribo {' '.join(COMMAND)}"
+    start = f"{sys.executable} -m tribo {' '.join(trial.command)}"
     line = wrapped.format(command=start, verbose=start.removesuffix(" -q"))
 
     def prepared() -> None:
@@ -180,23 +192,64 @@ def in_environment(trial: Trial, campaign: Path, folder: Path) -> dict[str, Any]
 
 
 def differing(found: dict[str, str], expected: dict[str, str]) -> list[str]:
-    """Files that are not those of the undisturbed run; records of the command and the machine left out."""
+    """Files that are not those of the undisturbed run; records of the command and the machine left out, and what tribo
+    keeps for itself."""
     every = sorted({*found, *expected})
-    return [n for n in every if found.get(n) != expected.get(n) and Path(n).name not in RECORDS]
+    names = [n for n in every if found.get(n) != expected.get(n) and Path(n).name not in RECORDS]
+    return [n for n in names if "/kept/" not in n]
 
 
-def judged(seen: dict[str, Any], expected: dict[str, Any]) -> tuple[str, list[str]]:
-    """The outcome of a trial ("same bytes", "refused", or what is wrong), and the files that differ."""
+def same_numbers(one: Path, other: Path) -> bool:
+    """Whether two files say the same in words, and in numbers to six digits; of pictures, their text form is asked."""
+    if not (one.is_file() and other.is_file()):
+        return False
+    if one.suffix == ".nc":
+        return _same_tree(one, other)
+    if one.suffix not in TEXTS:
+        return True
+    first, second = (DERIVED.sub("", path.read_text("utf-8", "replace")) for path in (one, other))
+    if NUMBER.sub("#", first) != NUMBER.sub("#", second):
+        return False
+    pairs = zip(NUMBER.findall(first), NUMBER.findall(second), strict=True)
+    return all(_close(float(a.replace("−", "-")), float(b.replace("−", "-")), one.suffix) for a, b in pairs)
+
+
+def _close(a: float, b: float, suffix: str) -> bool:
+    return abs(a - b) <= (1e-3 if suffix == ".svg" else 0.0) + CLOSE * max(abs(a), abs(b), 1e-9)
+
+
+def _same_tree(one: Path, other: Path) -> bool:
+    import numpy as np
+    import xarray as xr
+
+    with xr.open_datatree(one) as first, xr.open_datatree(other) as second:
+        if set(first.groups) != set(second.groups):
+            return False
+        for group in first.groups:
+            for name, column in first[group].variables.items():
+                there = second[group].variables[name].values
+                if column.dtype.kind != "f":
+                    same = np.array_equal(column.values, there)
+                else:
+                    same = np.allclose(column.values, there, rtol=CLOSE, atol=1e-12, equal_nan=True)
+                if not same:
+                    return False
+    return True
+
+
+def judged(seen: dict[str, Any], expected: dict[str, Any], folder: Path, undisturbed: Path) -> tuple[str, list[str]]:
+    """The outcome of a trial ("same bytes", "same numbers", "refused", or what is wrong), and the files that differ."""
     words, status = seen["words"], seen["status"]
     other = differing(seen["state"], expected["state"])
     if status is None:
         return "no end", other
     if "Traceback (most recent call last)" in words or re.search(r"Segmentation fault|Aborted|core dumped", words):
         return "traceback or crash", other
-    if status == expected["status"] and not other:
-        return "same bytes", []
     if status == expected["status"]:
-        return "other bytes without a word" if not _sentences(words) else "other bytes, with a sentence", other
+        worse = [name for name in other if not same_numbers(folder / name, undisturbed / name)]
+        if worse:
+            return "other results", worse
+        return ("same numbers" if other else "same bytes"), other
     return "refused" if _sentences(words) else "refused without a word", other
 
 
@@ -212,24 +265,27 @@ class Trials:
         self.campaign = root / "campaign.zip"
         if not self.campaign.exists():
             processes.zipped_campaign(root / "campaign")
-            self.expected = self._seen(Trial(-1, ()))
-            (root / "expected.json").write_text(json.dumps(self.expected))
-        else:
-            self.expected = json.loads((root / "expected.json").read_text())
+            expected = {}
+            for trial in (Trial(-EVERY_FIFTH, ()), Trial(-1, ())):
+                expected[trial.command[0]] = in_environment(trial, self.campaign, self.folder(trial))
+            (root / "expected.json").write_text(json.dumps(expected))
+        self.expected = json.loads((root / "expected.json").read_text())
 
-    def _seen(self, trial: Trial) -> dict[str, Any]:
-        folder = self.root / f"trial-{trial.number}"
+    def folder(self, trial: Trial) -> Path:
+        folder = self.root / (f"trial-{trial.number}" if trial.number >= 0 else f"undisturbed-{trial.command[0]}")
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
-        try:
-            return in_environment(trial, self.campaign, folder)
-        finally:
-            if not (trial.number < 0 or os.environ.get("KEEP_TRIALS")):
-                shutil.rmtree(folder, ignore_errors=True)
+        return folder
 
     def __call__(self, trial: Trial) -> dict[str, Any]:
-        seen = self._seen(trial)
-        outcome, other = judged(seen, self.expected)
+        folder = self.folder(trial)
+        try:
+            seen = in_environment(trial, self.campaign, folder)
+            command = trial.command[0]
+            outcome, other = judged(seen, self.expected[command], folder, self.root / f"undisturbed-{command}")
+        finally:
+            if not os.environ.get("KEEP_TRIALS"):
+                shutil.rmtree(folder, ignore_errors=True)
         return {
             "number": trial.number, "name": trial.name, "kinds": [s.kind for s in trial.settings], "outcome": outcome,
             "status": seen["status"], "files": other[:6], "words": seen["words"][-600:],
@@ -240,7 +296,7 @@ def in_a_line(row: dict[str, Any]) -> str:
     return f"{row['number']:3d} {row['name']}: {row['outcome']} (exit {row['status']})"
 
 
-HELD = ("same bytes", "refused")
+HELD = ("same bytes", "same numbers", "refused")
 
 
 def table(rows: list[dict[str, Any]]) -> str:

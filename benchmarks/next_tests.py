@@ -336,7 +336,7 @@ def speaks(v: Verdict, test: NextTest) -> bool:
     if v.verdict == "no_misfit":
         return not separates or separates <= untested
     if causes := {name for names in alternatives(v) for name in names}:
-        acted = str(design.get("measure", design.get("without", ""))).partition(":")[0]
+        acted = str(design.get("measure") or design.get("without") or "").partition(":")[0]
         follows = {str(MECHANISMS[n.partition(":")[0]].column(n.partition(":")[2])) for n in causes}
         if acted:
             return acted in {name.partition(":")[0] for name in causes}

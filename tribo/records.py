@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -783,6 +783,18 @@ class Ingested:
     by_hand: Mapping[str, Override] = field(default_factory=dict)
     readings: tuple[Reading, ...] = ()
     features: Mapping[str, Mapping[str, Feature]] = field(default_factory=dict)
+
+    def typical(self, tests: Sequence[Test]) -> Test:
+        """Of some usable tests that with the fewest flags, and among these the one whose static peak lies nearest their
+        median; equally near ones, to nine digits, in the order of their ids, so that every processor chooses alike."""
+        peaks = {t.test_id: self.pulls[t.test_id].static_N for t in tests}
+        middle = float(np.median(list(peaks.values())))
+
+        def order(test: Test) -> tuple[int, float, str]:
+            away = abs(peaks[test.test_id] - middle) / abs(middle) if middle else abs(peaks[test.test_id])
+            return len(self.pulls[test.test_id].flags), round(away, 9), test.test_id
+
+        return min(tests, key=order)
 
     def doubts(self) -> tuple[SetAside, ...]:
         """Tests that were used although their row, export or pull is doubtful, for example because of a spike."""

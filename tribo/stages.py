@@ -327,8 +327,7 @@ def _as_recorded(
             continue
         nearest = min(abs(np.log(t.normal_load_N / load)) for t in tests)
         beside = [t for t in tests if abs(np.log(t.normal_load_N / load)) <= nearest + 1e-6]
-        middle = float(np.median([ingested.pulls[t.test_id].static_N for t in beside]))
-        test = min(beside, key=lambda t: abs(ingested.pulls[t.test_id].static_N - middle))
+        test = ingested.typical(beside)
         pull, trace = ingested.pulls[test.test_id], ingested.traces[test.test_id]
         rate = 1.0 / float(np.median(np.diff(trace.time_s)))
         speed = float(test.speed_m_s or np.nan)

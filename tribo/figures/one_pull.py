@@ -62,13 +62,7 @@ def _typical(tests: list[Test], study: Study) -> Test:
     levels = findings.load_levels(np.array([t.normal_load_N for t in tests]))
     distinct = np.unique(levels)
     middle = distinct[len(distinct) // 2]
-    pulls = study.ingested.pulls
-    candidates = [t for t, level in zip(tests, levels, strict=True) if level == middle]
-    peak = float(np.median([pulls[t.test_id].static_N for t in candidates]))
-    return min(
-        candidates,
-        key=lambda t: (len(pulls[t.test_id].flags), abs(pulls[t.test_id].static_N - peak), t.test_id),
-    )
+    return study.ingested.typical([t for t, level in zip(tests, levels, strict=True) if level == middle])
 
 
 def example_numbers(study: Study) -> pd.DataFrame:

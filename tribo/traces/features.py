@@ -61,6 +61,7 @@ _FEWEST, _FEWEST_SLIPS = 8, 4
 _BEYOND_MIDDLE = 0.575  # share of a loading from the middle of where its slope is read to its end
 _DECAYS = 6.0  # decay lengths after the peak over which the decay is fitted
 _BLOCKS = 16
+_CONVERGED = 1e-13  # relative: every processor comes to the same printed digits
 _NEAR = 0.2  # share of the main frequency within which variance belongs to it
 _NORMAL = 1.959964
 
@@ -263,18 +264,26 @@ def _decay_fit(
     def decay(t: FloatArray, length: float, start: float, level: float) -> FloatArray:
         return np.asarray(level + (start - level) * np.exp(-t / abs(length)))
 
+    def slopes_of(values: FloatArray) -> FloatArray:
+        length, start, level = values
+        left = np.exp(-after / abs(length))
+        longer = math.copysign(1.0, length) * (start - level) * left * after / length**2
+        return np.column_stack([longer, left, 1.0 - left])
+
     if after.size < _FEWEST:
         return None
     guess = length_s, float(fall[0]), float(np.median(fall[-max(fall.size // 4, 1) :]))
     try:
-        solved = least_squares(lambda values: decay(after, *values) - fall, guess, method="lm", max_nfev=200)
+        solved = least_squares(
+            lambda values: decay(after, *values) - fall, guess, slopes_of, method="lm", max_nfev=200,
+            ftol=_CONVERGED, xtol=_CONVERGED, gtol=_CONVERGED,
+        )  # fmt: skip
     except ValueError:
         return None
     if not solved.success:
         return None
     best = solved.x
-    away, left = fall - decay(after, *best), np.exp(-after / abs(best[0]))
-    slopes = np.column_stack([(best[1] - best[2]) * left * after / best[0] ** 2, left, 1.0 - left])
+    away, slopes = fall - decay(after, *best), slopes_of(best)
     inverse = np.linalg.pinv(slopes.T @ slopes)  # noise differs along the decay: the covariance of White (1980)
     covariance = inverse @ (slopes.T * away**2) @ slopes @ inverse * after.size / (after.size - 3.0)
     u = np.sqrt(np.diag(covariance) * max(_correlation_time(away), tau))
