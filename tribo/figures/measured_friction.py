@@ -32,6 +32,7 @@ _LAW_POINTS = 80
 _MOST_VARIABLES = 8
 _RECORD_POINTS = 80
 _MOST_RECORDS = 60
+METRES_FROM, WAYS = 1.0, ("distance (mm)", "distance (m)")
 
 
 def dependence_points(study: Study) -> pd.DataFrame:
@@ -83,10 +84,12 @@ def within_records(study: Study) -> pd.DataFrame:
         time, force = (np.asarray(v)[: count * size].reshape(count, size).mean(axis=1)
                        for v in (trace.time_s - trace.time_s[0], trace.force_N - pull.zero_N))  # fmt: skip
         slid = test.speed_m_s is not None
+        way_m = time * (test.speed_m_s or 0.0)
+        far = bool(way_m[-1] >= METRES_FROM)
         frames.append(pd.DataFrame({
             "sample_number": order[test.sample], "sample": test.sample, "test_id": test.test_id,
-            "normal_load_N": test.normal_load_N, "way": "distance (m)" if slid else "time (s)",
-            "value": time * (test.speed_m_s or 1.0), "T_over_N": force / test.normal_load_N,
+            "normal_load_N": test.normal_load_N, "way": WAYS[far] if slid else "time (s)",
+            "value": way_m * (1.0 if far else 1e3) if slid else time, "T_over_N": force / test.normal_load_N,
         }))  # fmt: skip
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=RECORD_COLUMNS)
 

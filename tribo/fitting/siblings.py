@@ -384,7 +384,7 @@ def _of_pulls(
             regimes = [regime for regime in REGIMES if any(regime in found[other] for other in together)]
             yield Doubt(
                 "siblings", f"{' and '.join(regimes)} friction of {len(together)} tests of {test.sample}",
-                f"{least} to {_far_off(deviation)} {way} that of siblings", "less, by the scatter of the others",
+                f"between {least} and {_far_off(deviation)} {way} that of siblings", "no more than the others scatter",
                 f"tests {_some_of(together)}{_in_common(ingested.campaign, together)}",
                 "another load, another specimen or another sample than stated, the beginning of a series, or damaged "
                 "records?", tests=tuple(together),
@@ -392,8 +392,9 @@ def _of_pulls(
 
 
 def _far_off(deviation: float) -> str:
-    """ "18 %" or "410 times", of a deviation of ln T."""
-    return f"{100 * abs(math.expm1(deviation)):.0f} %" if abs(deviation) < math.log(3) else _times(deviation)
+    """ "18 %" or "a factor of 410", of a deviation of ln T."""
+    factor = _times(deviation).removesuffix(" times")
+    return f"{100 * abs(math.expm1(deviation)):.0f} %" if abs(deviation) < math.log(3) else f"a factor of {factor}"
 
 
 def _some_of(test_ids: Sequence[str]) -> str:

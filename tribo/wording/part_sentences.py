@@ -46,7 +46,7 @@ TAKEN_UP = {
     "absorbed": "the calibration on the flat sample absorbs its effect",
     "hidden": "the error of the model for the patterns, or a difference between specimens or days, could look the same",
 }
-MOST_LISTED, MOST_RECORDS = 6, 8
+MOST_LISTED, MOST_RECORDS = 6, 3
 SYMBOLS = {"mu": "μ", "T0": "T₀"}  # of parameters of a law in a sentence
 ALONE = {
     "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
@@ -261,6 +261,29 @@ def _own_law(layer: Layer) -> str:
     )
 
 
+def laws_in_short(layers: Sequence[Layer]) -> list[str]:
+    """The laws of several samples, each with its telling parameter (the exponent, else the first), in a sentence a
+    regime; and the means of those at too few loads for a law in another."""
+    sentences = []
+    for regime in dict.fromkeys(layer.regimes[0] for layer in layers):
+        by_formula: dict[str, list[str]] = {}
+        means = []
+        for layer in (x for x in layers if x.regimes[0] == regime):
+            sample = layer.samples[0]
+            if "T/N" in layer.parameters:
+                means.append(f"{_sized(layer.parameters['T/N'])} for {sample}")
+                continue
+            name = "b" if "b" in layer.parameters else next(iter(layer.parameters))
+            size = _sized(layer.parameters[name]).replace(" (90 % interval", ",").removesuffix(")")
+            by_formula.setdefault(layer.formula, []).append(f"{sample} ({SYMBOLS.get(name, name)} = {size})")
+        told = [f"{formula} for {joined(samples)}" for formula, samples in by_formula.items()]
+        if told:
+            sentences.append(f"{sentence_case(regime)} friction follows {'; '.join(told)}; 90 % intervals in brackets.")
+        if means:
+            sentences.append(f"Mean {regime} T/N, at too few loads to choose a law: {joined(means)}.")
+    return sentences
+
+
 def _sized(e: Estimate) -> str:
     said = f"{e.value:.3g} {e.unit}".rstrip()
     return true_minus(f"{said} (90 % interval {e.low:.3g} to {e.high:.3g})" if math.isfinite(e.low) else said)
@@ -293,9 +316,9 @@ def _follows(f: ColumnEffect) -> str:
 
 
 def _running_in(records: Sequence[RunningIn]) -> str:
-    sizes = [f"{signed(r.first_percent)} %" for r in records]
-    shown = [f"{r.test_id} ({r.sample}) {size}" for r, size in zip(records[:MOST_RECORDS], sizes, strict=False)]
-    more = f" and {len(records) - MOST_RECORDS} more" if len(records) > MOST_RECORDS else ""
+    ordered = sorted(records, key=lambda r: -abs(r.first_percent))
+    shown = [f"{r.test_id} ({r.sample}) {signed(r.first_percent)} %" for r in ordered[:MOST_RECORDS]]
+    more = f" and {len(records) - MOST_RECORDS} more by less" if len(records) > MOST_RECORDS else ""
     share = 100.0 * records[0].distance_m / records[0].whole_m
     return (
         f"Running-in or drift: over the first {share:.0f} % of the distance, sliding friction differs from that of the "

@@ -42,6 +42,7 @@ from tribo.wording.numerals import (
 from tribo.wording.part_sentences import (
     cause_sentence,
     change_over_range,
+    laws_in_short,
     layer_sentence,
     meaning_in_words,
     misfit_sentence,
@@ -53,7 +54,7 @@ from tribo.wording.part_sentences import (
 )
 from tribo.wording.table_sentences import published_evidence, published_sentence
 
-MOST_LAWS = 4
+MOST_LAWS, IN_FULL = 4, 2  # laws of samples that a finding holds at all, and each in a sentence of its own
 MOST_TESTED = 12
 MOST_COPIED = 3  # groups of tests with equal forces that are listed
 FACTOR = 1.1  # from which on a scatter is said as a factor instead of in percent
@@ -419,7 +420,7 @@ def _without_model(v: Verdict) -> Verdict:
         if shows.lack is not None:
             evidence.append(f"What else friction varies with cannot be told: {lacking(shows.lack)}.")
         if len(laws) <= MOST_LAWS:
-            sentence = [*found, *laws]
+            sentence = [*found, *(laws if len(laws) <= IN_FULL else laws_in_short(of_kind(v, "baseline")))]
     elif shows.lack is not None:
         said = [f"Cannot tell what friction varies with beside the law of each sample: {lacking(shows.lack)}."]
         sentence = [*said, *laws[:1]]
