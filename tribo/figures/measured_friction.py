@@ -267,8 +267,8 @@ def _regimes(numbers: pd.DataFrame) -> list[Line2D]:
 FORCES = style.StudyFigure(
     "forces",
     "Friction force against load",
-    "Friction force of every test and the law chosen for each sample by loads left out of the fit. Both axes "
-    "are logarithmic where the forces span more than a decade: a power law is then a straight line.",
+    "Friction force of every test and the law chosen for each sample by loads left out of the fit. Where "
+    "forces span more than a decade, both axes are logarithmic, and a power law is a straight line.",
     law_points,
     draw_forces,
 )

@@ -420,7 +420,9 @@ def _without_model(v: Verdict) -> Verdict:
         if shows.lack is not None:
             evidence.append(f"What else friction varies with cannot be told: {lacking(shows.lack)}.")
         if len(laws) <= MOST_LAWS:
-            sentence = [*found, *(laws if len(laws) <= IN_FULL else laws_in_short(of_kind(v, "baseline")))]
+            own = of_kind(v, "baseline")
+            means = sum("T/N" in layer.parameters for layer in own)
+            sentence = [*found, *(laws if len(laws) <= IN_FULL and means < len(laws) else laws_in_short(own))]
     elif shows.lack is not None:
         said = [f"Cannot tell what friction varies with beside the law of each sample: {lacking(shows.lack)}."]
         sentence = [*said, *laws[:1]]
