@@ -18,7 +18,7 @@ from tribo.diagnostics import (
     residual_table,
     weighing_table,
 )
-from tribo.diagnostics.candidates import CauseCandidate, weigh
+from tribo.diagnostics.candidates import CauseCandidate, Named, weigh
 from tribo.diagnostics.model import PATTERN, Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.planning import (
@@ -30,6 +30,7 @@ from tribo.diagnostics.planning import (
     first_test_of,
     narrowing_pulls,
     next_test,
+    next_test_of,
     settling_test,
     width_left,
 )
@@ -279,6 +280,26 @@ def test_a_cause_that_pulls_of_any_number_do_not_narrow_is_tested_with_what_was_
     assert test.design["sample"] == "B"  # that with the longest rims of this design
     assert test.design["share_of_width"] > 0.8
     assert next_test_sentence(test).startswith("Vary the pull speed over")
+
+
+@pytest.mark.parametrize(("shear", "suction", "first"), [(0.02, 8e3, "suction"), (0.4, 1e3, "velocity_dependence")])
+def test_of_two_causes_the_one_that_changes_friction_most_is_tested_next(
+    shear: float, suction: float, first: str
+) -> None:
+    speeds = replace(SMALL, speeds_mm_s=(0.1, 0.2, 0.8))
+    of_speed, of_air = acting("velocity_dependence", shear), acting("suction", suction)
+    c = made(lambda s: of_speed(s) + of_air(s), seed=6, design=speeds)
+    names = ("suction", "velocity_dependence")
+    start, causes = baseline(c), []
+    for name in names:
+        others = {a.name for a in candidates(setup_of(c), LAW)} - {name}
+        (cause,) = weigh(start_effects(start), others)
+        causes.append((cause,))
+        start = cause.fit
+    named = Named(start, None, tuple(causes))  # type: ignore[arg-type]
+    test = next_test_of(named, "named", (), start, ())
+    assert test is not None
+    assert test.separates == (first,)
 
 
 def test_two_columns_that_act_together_are_varied_each_with_each() -> None:

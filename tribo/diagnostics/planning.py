@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import block_diag
 
-from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named
+from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named, refitted
 from tribo.diagnostics.fit import ModelFit, scored, solved, state_at
 from tribo.diagnostics.model import Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
@@ -190,8 +190,21 @@ def next_test_of(
     for alike in named.causes:
         if len(alike) > 1:
             return next_test(alike)
-    best = named.causes[-1][0]
-    return next_test([best, *named.rivals]) or settling_test(best)
+    if named.rivals:
+        return next_test([named.causes[-1][0], *named.rivals])
+    return settling_test(_acting_most(named))
+
+
+def _acting_most(named: Named) -> CauseCandidate:
+    """The cause that changes friction most, which a finding tells first, fitted as the last of all causes."""
+    model = named.model
+    changes = {a.name: float(np.abs(np.expm1(effect_of(model.setup, model.law, a, v))).max())
+               for a, v in zip(model.acting, model.values, strict=True)}  # fmt: skip
+    most = max((alike[0] for alike in named.causes), key=lambda cause: changes.get(cause.name, 0.0))
+    if most is named.causes[-1][0]:
+        return most
+    others = [a for a in model.acting if a.name != most.name]
+    return replace(most, fit=refitted(model, [*others, most.acting]))
 
 
 def settling_test(cause: CauseCandidate) -> NextTest | None:

@@ -171,9 +171,9 @@ def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
         subject = f"{sentence_case(meaning_in_words(names[0]))} ({name_in_words(names[0])}{choice}): this changes"
     else:
         subject = f"{sentence_case(_either(names))} (this campaign cannot tell which) changes"
-    also = [f"{_either(_alternatives(v, layer))} ({size_in_words(layer)})" for layer in others]
+    also = [f"{_either(_alternatives(v, layer))} by {size_in_words(layer)}" for layer in others]
     also += [f"{name_in_words(c.mechanism)} ({_parameters(c)})" for c in v.causes if isinstance(c.shows, TraceEvidence)]
-    also += [f"a change with {_columns(law)} ({size_in_words(law)})" for law in of_kind(v, "law")]
+    also += [f"a change with {_columns(law)} by {size_in_words(law)}" for law in of_kind(v, "law")]
     added = f"; in addition, {joined(also)}" if also else ""
     rest = v.verdict == "partly" and not v.shows.within_chance
     left = "; part of the difference from the model remains unexplained" if rest else ""
