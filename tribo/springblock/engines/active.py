@@ -575,13 +575,13 @@ def drift(until_step: int, s: State, a: Active, out: Samples, c: Numerics, machi
 
 
 @inner
-def moved_along(along: float, way: float, a: Active, c: Numerics, pulled: IntArray | None) -> float:
+def moved_along(along: float, way: float, a: Active, c: Numerics) -> float:
     """Displacement along the pull beyond the quasi-static one, summed over the blocks that the slider pulls."""
     copied_into_callers()
-    if pulled is None:
+    if len(c.pulled) == 0:
         return along + way * total(a.sums.along)
     found, p = 0.0, a.planes
-    for block in pulled:
+    for block in c.pulled:
         y, x = divmod(block, c.nx)
         i = p.first + y * p.width + x
         found += p.q_x[i] * c.direction_x + p.q_y[i] * c.direction_y
@@ -632,7 +632,7 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
                 for strip in lists.strips[row, : lists.members[row]]:
                     moving += a.moving[strip]
         rest_all(a, c)
-        s.totals[ALONG] = moved_along(along, way, a, c, c.pulled)
+        s.totals[ALONG] = moved_along(along, way, a, c)
         move_slider(c.dt, c.machine)
         observe(1, moving, s, out, c)
     s.totals[FRICTION_WORK] = friction + way * total(a.sums.work)

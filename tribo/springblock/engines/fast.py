@@ -137,7 +137,7 @@ def at_rest(
         law=packed(config.terms),
         elastic=None if lattice.bond is None else True,
         machine=machine,
-        pulled=lattice.pulled,
+        pulled=np.array([] if lattice.pulled is None else lattice.pulled, np.int64),  # one type: compiled once
     )
     n = lattice.contact.size
     cells = np.zeros((n, k.WIDTH))

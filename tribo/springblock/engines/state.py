@@ -202,10 +202,10 @@ class Numerics(NamedTuple):
     stride: int
     stop_at_peaks: float  # stop once the time exceeds this multiple of the peak time
     peak_drop: float  # the first peak is found once the force has fallen by this share
+    pulled: NDArray[np.int64]  # blocks that the slider pulls; empty where it pulls all
     law: FloatArray | None  # parameters of the friction terms; None compiles to loops without them
     elastic: bool | None = None  # True where contact is elastic; None compiles to loops of rigid contact
     machine: FloatArray | None = None  # the slider, which the loops move; None compiles to loops of a rigid machine
-    pulled: NDArray[np.int64] | None = None  # blocks that the slider pulls; None where it pulls all
 
 
 @inner
