@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from hypothesis import settings
 from on_the_command_line import run
+from small_lattices import small_lattices
 from support.campaigns import DESIGN, DIALECTS, MadeCampaign, small, write_made
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -95,7 +96,8 @@ def small_report(small_campaign: Path, once: Once) -> Path:
     """`tribo report` on the small campaign; what it said with --json lies beside its folder."""
 
     def report(folder: Path) -> None:
-        result = run("report", small_campaign, "-o", folder / "out", "--runs", 2, "--json")
+        with small_lattices():
+            result = run("report", small_campaign, "-o", folder / "out", "--runs", 2, "--json", "--jobs", 1)
         assert result.exit_code == 0, result.output
         (folder / "said.json").write_text(result.stdout, encoding="utf-8")
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from tribo.campaign.description import PatternTable
 from tribo.campaign.geometry import Making, faults_of_making
 from tribo.cli import main
-from tribo.design import rounds
+from tribo.design import answer_files, rounds
 from tribo.design.answer_files import polygons_um, repeat_um
 from tribo.design.rounds import fitted
 from tribo.design.target import Family, Space, read_target
@@ -48,6 +48,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     meshes = {"coarse": (16, 5e-6, 1e-7), "fine": (20, 4e-6, 1e-7)}
     meshes |= {"patch": (14, 4e-6, 1e-7), "halved": (28, 2e-6, 5e-8)}
     monkeypatch.setattr(rounds, "MESHES", meshes)
+    monkeypatch.setattr(answer_files, "PNG_PIXELS", 100)
 
 
 def designed(folder: Path, out: str = "out", value: float = 5.0, **more: str) -> tuple[int, dict]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from support import first_quick
 
 from .exam import Seen, sat, summary
 from .kinds import KINDS
 
 
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> list[Seen]:
-    return sat(KINDS, [3], Path(tmp_path_factory.mktemp("programmes")) / "campaign")
+@pytest.fixture(scope="module", params=first_quick([list(KINDS)[1::2], list(KINDS)]), ids=["every other", "all"])
+def seen(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[Seen]:
+    return sat(request.param, [3], Path(tmp_path_factory.mktemp("programmes")) / "campaign")
 
 
 def test_boundaries_of_phases_are_where_the_programme_has_them(seen: list[Seen]) -> None:
