@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from diagnose.synthetic import hidden
+from diagnose.examined import Once, examined
 from report.synthetic import make_study
 
 import tribo
 from tribo import errors, records
-from tribo.diagnostics import examine
 from tribo.display import displayed, exact_text, in_short
 
 MOST_LINES, MOST_LETTERS = 40, 120
@@ -42,10 +41,10 @@ def within(value: object, seen: set[int]) -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def found() -> list[Any]:
+def found(once: Once) -> list[Any]:
     """A study and a diagnosis, with every record in them."""
     kept: set[int] = set()
-    roots = (make_study(), examine(hidden(("temperature", 4.0)), replicates=(20, 15)), tribo.StudyOptions())
+    roots = (make_study(), examined("temperature", once), tribo.StudyOptions())
     return [record for root in roots for record in within(root, kept)]
 
 

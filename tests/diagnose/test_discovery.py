@@ -42,6 +42,7 @@ from tribo.wording.law_sentences import discovery_sentence, held_sentence, law_s
 from tribo.wording.part_sentences import layer_sentence, misfit_sentence, next_test_sentence
 from tribo.wording.verdict_sentences import verdict_in_words, worded
 
+from .examined import Once, examined
 from .known import acting, baseline, made
 
 
@@ -180,8 +181,8 @@ def test_a_diagnosis_adds_the_law_of_what_no_mechanism_explains(diagnosed: Diagn
 
 
 @pytest.fixture(scope="module")
-def quiet() -> Diagnosis:
-    return with_laws(examine(made(nothing, seed=102), replicates=(40, 40)))
+def quiet(once: Once) -> Diagnosis:
+    return with_laws(examined("nothing_of_known_size", once))
 
 
 def test_a_campaign_without_misfit_is_searched_and_none_is_found(quiet: Diagnosis) -> None:
@@ -270,10 +271,10 @@ def test_the_best_law_by_the_fitted_noise_is_among_those_scored_anew() -> None:
         assert exact[best].max() == pytest.approx(exact.max(), abs=0.05)
 
 
-def test_nothing_is_written_where_nothing_is_hidden() -> None:
-    quiet = discover_laws(baseline(made(nothing, seed=102)), replicates=20)
-    assert quiet.laws == ()
-    assert "None of the" in discovery_sentence(quiet)
+def test_nothing_is_written_where_nothing_is_hidden(quiet: Diagnosis) -> None:
+    assert quiet.laws is not None
+    assert quiet.laws.laws == ()
+    assert "None of the" in discovery_sentence(quiet.laws)
 
 
 def test_a_law_is_read_as_it_was_written(found: Discovery, tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from blind.tribometer import hide
 from support import first_quick
 
 from tribo.diagnostics.candidates import refitted
-from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.model import Acting, Setup
 from tribo.diagnostics.verdict import Cause, Estimate, Layer, Verdict
 from tribo.errors import CampaignError, SimulationError
@@ -27,6 +26,7 @@ from tribo.wording.law_sentences import planned_law_sentence
 from tribo.wording.part_sentences import layer_sentence
 from tribo.wording.verdict_sentences import worded
 
+from .examined import Once, examined
 from .known import Change, baseline, made
 from .synthetic import SMALL, ingested
 
@@ -65,8 +65,8 @@ def test_a_known_law_that_holds_is_added_and_one_that_cannot_be_tested_says_why(
     assert layers[0].low < layers[0].effect_percent < layers[0].high
 
 
-def test_a_verdict_lists_the_answers_about_known_laws(folder: Path) -> None:
-    quiet = with_laws(examine(made(nothing, seed=102), replicates=(40, 40)), read_laws(folder))
+def test_a_verdict_lists_the_answers_about_known_laws(folder: Path, once: Once) -> None:
+    quiet = with_laws(examined("nothing_of_known_size", once), read_laws(folder))
     said = worded(quiet.verdict)
     assert [law["answer"] for law in said.model["known_laws"]] == ["not held", "cannot be told"]
     assert "0 of 2 known laws held." in said.text

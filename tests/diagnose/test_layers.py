@@ -19,6 +19,7 @@ from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.wording.verdict_sentences import worded
 
+from .examined import Once, examined
 from .known import acting, made
 
 FEW = (60, 25)
@@ -44,7 +45,8 @@ def with_running_in(s: Setup) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def beside() -> Diagnosis:
-    return examine(made(with_running_in, seed=4), replicates=FEW)
+    two = Design(samples=("F", "B"), masses_g=(5.0, 25.0, 90.0, 138.5), repeats=3)
+    return examine(made(with_running_in, seed=3, design=two), replicates=(40, 20))
 
 
 @pytest.mark.slow
@@ -116,13 +118,13 @@ def test_without_noise_the_corrections_are_the_errors_that_were_drawn() -> None:
     assert [c.effect_percent for c in found] == pytest.approx(drawn, abs=4)  # specimens are expected to differ by 5 %
 
 
-def test_every_patterned_sample_has_a_correction_in_each_regime_and_the_flat_one_has_none(beside: Diagnosis) -> None:
-    corrected = {(x.name, *x.regimes) for x in beside.verdict.layers if x.kind == "pattern_correction"}
+def test_every_patterned_sample_has_a_correction_in_each_regime_and_the_flat_one_has_none(once: Once) -> None:
+    corrected = {(x.name, *x.regimes) for x in examined("nothing", once).verdict.layers if x.kind == "pattern_correction"}
     assert corrected == {(name, regime) for name in "ABC" for regime in ("static", "sliding")}
 
 
-def test_the_chance_of_a_correction_is_that_of_its_interval_times_the_number_of_corrections(beside: Diagnosis) -> None:
-    found = pattern_corrections(beside.baseline)
+def test_the_chance_of_a_correction_is_that_of_its_interval_times_the_number_of_corrections(once: Once) -> None:
+    found = pattern_corrections(examined("nothing", once).baseline)
     assert len(found) == 6
     for c in found:
         assert c.low < c.effect_percent < c.high

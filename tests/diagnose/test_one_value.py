@@ -28,7 +28,8 @@ NAMES = {
 @cache
 def told_of(kind: str) -> tuple[Verdict, str]:
     """The verdict on a campaign in which a cause of this kind is hidden, and the value that it is bound to."""
-    made = make(10, PATTERNS_OFF, hide=hide_one_value(10, PATTERNS_OFF, kind))
+    lab = replace(PATTERNS_OFF, samples=("F", "B")) if kind == "weight" else PATTERNS_OFF
+    made = make(10, lab, hide=hide_one_value(10, lab, kind))
     return worded(examine(handed_over(made.bench, 10), seed=10, replicates=(40, 20)).verdict), made.truth["value"]
 
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from tribo.diagnostics import examine
 from tribo.diagnostics.inference import pattern_corrections, pattern_excess
 from tribo.records import REGIMES
 from tribo.wording.verdict_sentences import worded
 
-from .synthetic import hidden
+from .examined import Once, examined
 from .test_scatter import baseline, off
 
 
-def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_p() -> None:
-    verdict = examine(hidden(seed=3, design=off(6.0)), replicates=(40, 20)).verdict
+def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_p(once: Once) -> None:
+    verdict = examined("patterns_off", once).verdict
     assert verdict.verdict == "unknown"
     own = {(c.name, c.regimes[0]): c for c in verdict.layers if c.kind == "pattern_correction"}
     assert {name for name, _ in own} == {"A", "B", "C"}

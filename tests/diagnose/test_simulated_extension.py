@@ -21,6 +21,7 @@ from tribo.diagnostics.simulated_extension import (
 from tribo.springblock import SimConfig, simulate
 from tribo.wording.verdict_sentences import worded
 
+from .examined import Once, examined
 from .synthetic import hidden
 
 FEW = (40, 25)
@@ -76,8 +77,8 @@ def test_the_residual_table_carries_the_simulated_force(hot: Diagnosis) -> None:
     assert np.log(static["simulated_N"]).to_numpy() == pytest.approx(simulated(hot).log_force[:, 0])
 
 
-def test_nothing_named_means_nothing_simulated() -> None:
-    d = with_simulation(examine(hidden(), replicates=FEW))
+def test_nothing_named_means_nothing_simulated(once: Once) -> None:
+    d = with_simulation(examined("nothing", once))
     assert d.simulated is None
     assert "simulated" not in d.verdict.as_dict()["model"]
 

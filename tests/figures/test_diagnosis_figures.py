@@ -8,39 +8,37 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from diagnose.synthetic import hidden
-from diagnose.test_scatter import off
+from diagnose.examined import Once, examined
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from support import first_quick
 
 from figures.against_verdict import contradictions
 from figures.test_figures import collisions
-from tribo.diagnostics import Diagnosis, examine
+from tribo.diagnostics import Diagnosis
 from tribo.diagnostics.fit import fit, residual_on_flat
 from tribo.diagnostics.model import PATTERN
 from tribo.figures import evidence, extended_model, misfit, residuals, style
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style
 
-FEW = (40, 25)
 NAMES = list(DIAGNOSIS_FIGURES)
 
 
 @pytest.fixture(scope="module")
-def temperature() -> Diagnosis:
-    return examine(hidden(("temperature", 4.0)), replicates=FEW)
+def temperature(once: Once) -> Diagnosis:
+    return examined("temperature", once)
 
 
 @pytest.fixture(scope="module")
-def nothing() -> Diagnosis:
-    return examine(hidden(), replicates=FEW)
+def nothing(once: Once) -> Diagnosis:
+    return examined("nothing", once)
 
 
 @pytest.fixture(scope="module")
-def patterns_off() -> Diagnosis:
+def patterns_off(once: Once) -> Diagnosis:
     """Patterns six times as far from the model as its stated error, and nothing else hidden."""
-    return examine(hidden(seed=3, design=off(6.0)), replicates=FEW)
+    return examined("patterns_off", once)
 
 
 def shown_points(figure: Figure) -> set[tuple[float, float]]:
