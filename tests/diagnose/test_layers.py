@@ -119,7 +119,8 @@ def test_without_noise_the_corrections_are_the_errors_that_were_drawn() -> None:
 
 
 def test_every_patterned_sample_has_a_correction_in_each_regime_and_the_flat_one_has_none(once: Once) -> None:
-    corrected = {(x.name, *x.regimes) for x in examined("nothing", once).verdict.layers if x.kind == "pattern_correction"}
+    layers = examined("nothing", once).verdict.layers
+    corrected = {(x.name, *x.regimes) for x in layers if x.kind == "pattern_correction"}
     assert corrected == {(name, regime) for name in "ABC" for regime in ("static", "sliding")}
 
 
