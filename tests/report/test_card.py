@@ -249,3 +249,12 @@ def test_the_card_in_a_terminal_has_at_most_eight_lines_with_the_next_test_last(
     left_out = notes + len(card.meanings) - sum(line.startswith("Note ") for line in lines)
     left_out -= sum(any(line.startswith(f"{name}:") for name, _ in card.meanings) for line in lines)
     assert (f"The report has {left_out} further notes." in lines) == (left_out > 0)
+
+
+def test_doubtful_numbers_come_before_any_sentence_on_friction(card: Card) -> None:
+    """The first, and how many there are besides; a card without doubts begins with the sentence."""
+    doubted = replace(card, doubts=("the load of test T7 is ten times too large", "another one"))
+    first, second, *_ = card_text(doubted).splitlines()
+    assert first == "Check first: the load of test T7 is ten times too large (and 1 more)"
+    assert second == card.sentence
+    assert card_text(replace(card, doubts=())).startswith(card.sentence)

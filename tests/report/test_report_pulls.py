@@ -15,6 +15,7 @@ from tribo.records import Override, Phase, Study
 from tribo.report.pulls import peak_above_samples, trace_data, trace_picture
 from tribo.report.shell import script_json
 from tribo.report.tables import phases_table
+from tribo.wording.study_sentences import FLAGS
 
 
 def unpacked(record: dict[str, object]) -> np.ndarray:
@@ -102,3 +103,8 @@ def test_stated_phases_are_a_peak_and_a_window_for_the_page(study: Study) -> Non
     changed = replace(study, ingested=replace(study.ingested, by_hand={"T0001": decided}))
     record = json.loads(trace_data(changed, ["T0001"]))["T0001"]
     assert record["decided"] == {"action": "move", "reason": "seen", "peak": 1.0, "window": [2.0, 9.0]}
+
+
+def test_a_drop_smaller_than_its_uncertainty_is_called_uncertain_and_not_absent() -> None:
+    """The flag is set where the peak lies less than three standard uncertainties above the sliding mean."""
+    assert FLAGS["no_drop"] == "no certain drop after the peak"
