@@ -330,3 +330,15 @@ def test_the_pulls_that_are_proposed_leave_four_fifths_of_the_width_of_an_interv
         for k in range(pulls)
     ]
     assert 0.75 < np.sqrt(information(tests) / information([*tests, *further])) < 0.82
+
+
+def test_the_pulls_for_a_cause_of_names_are_so_many_as_narrow_its_size() -> None:
+    """Counted without the cause in the model, which would leave nothing of its column to be known better."""
+    c = hidden(("covariate:operator", 3.0))
+    others = {a.name for a in candidates(setup_of(c), LAW)} - {"covariate:operator"}
+    (cause,) = weigh(start_effects(baseline(c)), others)
+    test = settling_test(cause)
+    assert test is not None
+    assert test.design["covariate"] == "operator"
+    assert test.design["pulls"] == narrowing_pulls(baseline(c), ["operator"])
+    assert test.design["pulls"] > narrowing_pulls(cause.fit, ["operator"])

@@ -212,9 +212,13 @@ def settling_test(cause: CauseCandidate) -> NextTest | None:
     amplitude measured directly, pulls without it, its column varied alone, or pulls that narrow its size."""
     own = (cause.name,)
     column = cause.acting.mechanism.column(cause.acting.choice)
-    alone = column in ("specimen_run", *cause.fit.setup.observations.conditions.columns)
     tests = confirming_test(cause), _measuring(cause, own), _removing(cause, own)
-    return next(filter(None, tests), first_test_of(cause.fit, column) if alone else narrowing_test(cause))
+    if (test := next(filter(None, tests), None)) is not None:
+        return test
+    if column in ("specimen_run", *cause.fit.setup.observations.conditions.columns):
+        others = [a for a in cause.fit.acting if a.name != cause.name]
+        return first_test_of(refitted(cause.fit, others), column)
+    return narrowing_test(cause)
 
 
 def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
