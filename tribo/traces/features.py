@@ -286,7 +286,10 @@ def _decay_fit(
     away, slopes = fall - decay(after, *best), slopes_of(best)
     inverse = np.linalg.pinv(slopes.T @ slopes)  # noise differs along the decay: the covariance of White (1980)
     covariance = inverse @ (slopes.T * away**2) @ slopes @ inverse * after.size / (after.size - 3.0)
-    u = np.sqrt(np.diag(covariance) * max(_correlation_time(away), tau))
+    variance = np.diag(covariance) * max(_correlation_time(away), tau)
+    if not (variance > 0.0).all():
+        return None  # no decay: its length is without bound, and rounding decides
+    u = np.sqrt(variance)
     return abs(float(best[0])), float(u[0]), float(best[1]), float(u[1]), float(best[2])
 
 
