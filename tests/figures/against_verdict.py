@@ -87,6 +87,11 @@ def _of_the_finding(d: Diagnosis) -> Iterator[str]:
             value = float(mean["y"].iloc[0]) if len(mean) else m.effect_percent
             if not _near(value, m):
                 yield f"the sentence says {m.effect_percent:+.0f} % of {m.sample}, the picture {value:+.0f} %"
+    laws = [layer.shows.law for layer in v.layers if layer.kind == "law" and hasattr(layer.shows, "law")]
+    if v.verdict == "unknown" and laws and (rows["axis"] == "Sample").any():
+        yield f"the sentence speaks of {' and '.join(laws[0].columns)}, the picture of samples"
+    if v.verdict == "unknown" and laws and means["group"].nunique() != min(len(laws[0].columns), 2):
+        yield f"the sentence speaks of {' and '.join(laws[0].columns)}, the picture of one of them"
     causes = [layer for layer in v.layers if layer.kind == "cause" and layer.over is not None]
     first = max(causes, key=lambda layer: abs(layer.effect_percent), default=None)
     biggest = max((x for x in v.layers if x.kind == "cause"), key=lambda x: abs(x.effect_percent), default=None)

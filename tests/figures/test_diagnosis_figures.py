@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -18,9 +19,12 @@ from figures.test_figures import collisions
 from tribo.diagnostics import Diagnosis
 from tribo.diagnostics.fit import fit, residual_on_flat
 from tribo.diagnostics.model import PATTERN
+from tribo.diagnostics.verdict import Layer
 from tribo.figures import evidence, extended_model, misfit, residuals, style
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
+from tribo.figures.residuals import draw_finding, finding_numbers
 from tribo.figures.style import house_style
+from tribo.lawsearch.grammar import Shape, WrittenLaw
 
 NAMES = list(DIAGNOSIS_FIGURES)
 
@@ -119,6 +123,32 @@ def test_a_figure_that_says_the_opposite_is_noticed(
     for said, d in wrong.items():
         assert any(said in text for text in contradictions(d)), said
     assert any("no misfit, and p" in text for text in contradictions(wrong["bars name"]))
+
+
+def with_law_of(d: Diagnosis, *columns: str) -> Diagnosis:
+    """The same campaign with a verdict that rests on a law of these columns."""
+    law = WrittenLaw(tuple(Shape("linear", name) for name in columns), "T", "static")
+    layer = Layer(
+        kind="law", name=" and ".join(columns), samples=(), regimes=("static",), p_adjusted=1e-6, effect_percent=20.0,
+        low=15.0, high=25.0, shows=SimpleNamespace(law=law),
+    )  # fmt: skip
+    return replace(d, verdict=replace(d.verdict, verdict="unknown", misfits=(), causes=(), layers=(layer,)))
+
+
+def test_the_picture_of_the_card_shows_the_columns_of_the_law_that_the_finding_tells(nothing: Diagnosis) -> None:
+    """One of two columns at the lowest and at the highest third of the other."""
+    one = finding_numbers(with_law_of(nothing, "humidity_pct"))
+    assert set(one["axis"]) == {"Relative humidity (%)"}
+    assert set(one["group"]) == {""}
+    two = finding_numbers(with_law_of(nothing, "temperature_C", "humidity_pct"))
+    assert set(two["axis"]) == {"Temperature (°C)"}
+    low, high = sorted(set(two.loc[two["mark"] == "mean", "group"]), reverse=True)
+    assert low.startswith("humidity up to")
+    assert high.startswith("humidity from")
+    c = nothing.baseline.setup.observations.conditions
+    assert float(low.split()[-2]) == pytest.approx(np.quantile(c.humidity_pct, 1 / 3), rel=0.02)
+    labels = [t.get_text() for t in draw_finding(two).legends[0].get_texts()]
+    assert labels[:2] == [low, high]
 
 
 def test_the_mean_of_a_pattern_that_rubs_more_is_that_much_higher_and_no_other_is(nothing: Diagnosis) -> None:

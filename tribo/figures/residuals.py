@@ -23,6 +23,7 @@ from tribo.figures.misfit import (
     pattern_differences,
 )
 from tribo.records import REGIMES, FloatArray
+from tribo.vocabulary import described
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
@@ -283,10 +284,14 @@ def _residual_legend(numbers: pd.DataFrame) -> list[Any]:
     return handles
 
 
-FINDING_COLUMNS = ["regime", "axis", "mark", "sample", "test_id", "x", "x_name", "y", "y_low", "y_high"]
+FINDING_COLUMNS = ["regime", "axis", "group", "mark", "sample", "test_id", "x", "x_name", "y", "y_low", "y_high"]
 BY_SAMPLE = ("area_fraction", "rim_per_m", "elongation", "clip_N", "sample", "tau0")
-RECORDED = {"speed_m_s": "speed_mm_s", "elapsed_s": "started_at"}
+RECORDED = {
+    "speed_m_s": "speed_mm_s", "elapsed_s": "started_at", "clock_h": "time of day", "pressure_Pa": "normal_load_N",
+    "contact_pressure_Pa": "normal_load_N",
+}  # fmt: skip
 WIDTH_MM, HEIGHT_MM = 130.0, 66.0
+MOST_GROUPS = 4
 LETTERS_ACROSS = 20  # of names below a panel, above which they are turned
 
 
@@ -295,7 +300,8 @@ def finding_numbers(d: Diagnosis) -> pd.DataFrame:
 
     The model is the one calibrated on the flat sample alone. ``mark`` is test; mean, of a value of the column, with
     twice its standard error; band, two standard deviations of such a mean by the fitted noise; curve, what the named
-    causes add. The column is that of the cause that acts most, else that of the first misfit, else the sample.
+    causes add. The column is that of the cause that acts most, else that of the first law or misfit, else the sample.
+    A law of two columns is shown against the first, ``group`` being the lowest and the highest third of the second.
     """
     from tribo.diagnostics.fit import residual_on_flat
 
@@ -303,6 +309,7 @@ def finding_numbers(d: Diagnosis) -> pd.DataFrame:
     column = _column(d)
     here = np.isfinite(column.values)
     residual = residual_on_flat(d.baseline)
+    groups = _thirds(d)
     rows: list[dict[str, Any]] = []
     for regime in REGIMES:
         weight = np.array(WEIGHTS[regime])
@@ -314,8 +321,36 @@ def finding_numbers(d: Diagnosis) -> pd.DataFrame:
                "x_name": column.names[round(column.values[i])] if column.names else "", "y": y[i]}
             for i in np.flatnonzero(here)
         ]  # fmt: skip
-        rows += [common | row for row in summaries(d, column, here, y, weight, added_by_causes(d, residual, weight))]
-    return pd.DataFrame(rows, columns=FINDING_COLUMNS)
+        added = added_by_causes(d, residual, weight)
+        for group, tests in groups.items():
+            rows += [common | {"group": group} | row for row in summaries(d, column, here & tests, y, weight, added)]
+    return pd.DataFrame(rows, columns=FINDING_COLUMNS).fillna({"group": ""})
+
+
+def _thirds(d: Diagnosis) -> dict[str, np.ndarray]:
+    """The tests at the lowest and at the highest third of the second column of the law that was found; all tests where
+    the finding is of one column."""
+    every = np.ones(d.baseline.setup.observations.n, bool)
+    columns = _law_columns(d)
+    if len(columns) < 2 or d.verdict.verdict != "unknown":
+        return {"": every}
+    second = covariate(d.baseline.setup, RECORDED.get(columns[1], columns[1]))
+    words, x = described(second.name), second.values
+    name = words.short or second.name
+    if second.names:
+        return {f"{name} {value}": x == place for place, value in enumerate(second.names[:MOST_GROUPS])}
+    low, high = np.nanquantile(x, (1 / 3, 2 / 3))
+    ends = x[x <= low].max(), x[x >= high].min()
+    return {
+        f"{name} up to {ends[0]:.3g} {words.unit}".rstrip(): x <= low,
+        f"{name} from {ends[1]:.3g} {words.unit}".rstrip(): x >= high,
+    }
+
+
+def _law_columns(d: Diagnosis) -> tuple[str, ...]:
+    """The columns of the first law that was found."""
+    found = (getattr(layer.shows, "law", None) for layer in d.verdict.layers if layer.kind == "law")
+    return next((tuple(law.columns) for law in found if law is not None), ())
 
 
 def _column(d: Diagnosis) -> Covariate:
@@ -336,7 +371,7 @@ def _names(d: Diagnosis) -> list[str]:
         m = acting.mechanism
         followed = [m.column(acting.choice)] if acting.choice or m.choosing.column else list(m.needs)
     else:
-        followed = [m.covariate for m in d.verdict.misfits[:1]]
+        followed = [*_law_columns(d)[:1]] or [m.covariate for m in d.verdict.misfits[:1]]
     if any(name in BY_SAMPLE for name in followed):
         return ["sample"]
     return [RECORDED.get(name, name) for name in followed]
@@ -369,6 +404,7 @@ def draw_finding(numbers: pd.DataFrame) -> Figure:
 def _finding_panel(ax: Axes, part: pd.DataFrame) -> None:
     tests, mean = part[part["mark"] == "test"], part[part["mark"] == "mean"]
     named = bool(tests["x_name"].any())
+    groups = list(dict.fromkeys(mean["group"]))
     band, curve = (part[part["mark"] == mark].sort_values("x").astype({"x": float}) for mark in ("band", "curve"))
     if named:
         ax.bar(band["x"], band["y_high"] - band["y_low"], 0.8, band["y_low"], color="0.75", alpha=0.45, lw=0)
@@ -377,8 +413,11 @@ def _finding_panel(ax: Axes, part: pd.DataFrame) -> None:
         ax.fill_between(band["x"], band["y_low"], band["y_high"], color="0.75", alpha=0.45, lw=0)
         ax.plot(curve["x"], curve["y"], "-", color=style.VERMILLION, lw=1.8, zorder=4)
         ax.plot(tests["x"], tests["y"], "o", color="0.5", ms=1.6, alpha=0.5, mew=0)
-    bars = np.abs(mean[["y_low", "y_high"]].to_numpy(float) - mean[["y"]].to_numpy(float)).T
-    ax.errorbar(mean["x"], mean["y"], bars, fmt="o", ms=3.6, color="black", elinewidth=1.0, zorder=5)
+    for number, group in enumerate(groups):
+        own = mean[mean["group"] == group]
+        bars = np.abs(own[["y_low", "y_high"]].to_numpy(float) - own[["y"]].to_numpy(float)).T
+        colour = _colour(number, len(groups))
+        ax.errorbar(own["x"], own["y"], bars, fmt="o", ms=3.6, color=colour, elinewidth=1.0, zorder=5)
     ax.axhline(0, color="0.4", lw=0.8)
     _finding_axis(ax, part, named)
 
@@ -400,11 +439,17 @@ def _finding_axis(ax: Axes, part: pd.DataFrame, named: bool) -> None:
         ax.tick_params(axis="x", labelsize=6.5)
 
 
+def _colour(number: int, groups: int) -> str:
+    return "black" if groups == 1 else (style.BLUE, style.VERMILLION, "black", "0.5")[number]
+
+
 def _finding_legend(numbers: pd.DataFrame) -> list[Any]:
+    groups = list(dict.fromkeys(numbers.loc[numbers["mark"] == "mean", "group"]))
     handles: list[Any] = [
-        Line2D([], [], color="black", marker="o", lw=1.0, ms=3.6, label="mean ± 2 SE"),
-        Patch(color="0.75", alpha=0.6, lw=0, label="expected if the model is right"),
+        Line2D([], [], color=_colour(k, len(groups)), marker="o", lw=1.0, ms=3.6, label=group or "mean ± 2 SE")
+        for k, group in enumerate(groups)
     ]
+    handles.append(Patch(color="0.75", alpha=0.6, lw=0, label="expected if the model is right"))
     if (numbers["mark"] == "curve").any():
         handles.append(Line2D([], [], color=style.VERMILLION, lw=1.8, label="named cause"))
     return handles
@@ -416,7 +461,8 @@ FINDING = style.FigureOf(
     "Difference of measured from modelled friction, in percent, against the quantity that it follows. The model is "
     "calibrated on the flat sample. Points "
     "with bars: geometric means with twice their standard error. Band: range of 95 % of such means if the model were "
-    "right. Thick line, if a cause is named: what it adds. Small points, if shown: tests.",
+    "right. Thick line, if a cause is named: what it adds. Small points, if shown: tests. A law of two quantities is "
+    "shown at the lowest and the highest third of the second.",
     finding_numbers,
     draw_finding,
 )
