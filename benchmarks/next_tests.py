@@ -27,7 +27,7 @@ import pandas as pd  # isort: skip
 from blind import hidden_laws  # isort: skip
 from blind.tribometer import Bench, hide, with_further  # isort: skip
 from figures.against_verdict import contradictions  # isort: skip
-from scipy.stats import f as f_distribution  # isort: skip
+from scipy.stats import f as f_distribution, ttest_ind  # isort: skip
 
 if TYPE_CHECKING:
     from tribo.diagnostics.verdict import NextTest, Verdict
@@ -276,6 +276,14 @@ class Laboratory:
         rows = self._of(sample, pulls, middle)
         if column == "specimen_run":
             return rows.assign(specimen=[f"{sample[0]}{7 + k % 3}" for k in range(pulls)])
+        if column.startswith("specimen "):  # that specimen and fresh ones in turn
+            name = column.removeprefix("specimen ")
+            own = self.bench.tests[self.bench.tests["specimen"] == name]
+            own = own.iloc[np.resize(np.arange(len(own)), pulls // 2)].assign(N=middle)
+            others = self._of(str(own["sample"].iloc[0]), pulls - len(own), middle)
+            fresh = [f"{name[0]}{7 + k % 3}" for k in range(len(others))]
+            others = others.assign(specimen=fresh, true_sample=others["sample"])
+            return pd.concat([own, others]).sample(frac=1.0, random_state=1).reset_index(drop=True)
         if column == "sample":
             names = sorted(set(self.bench.tests["sample"]))
             parts = [self._of(name, -(-pulls // len(names)), middle) for name in names]
@@ -417,6 +425,11 @@ def _follows(test: NextTest, rows: pd.DataFrame, lab: Laboratory) -> bool:
     columns = list(test.design.get("vary") or [test.design["covariate"]])
     if columns == ["sample"]:
         return False  # no kind of this exam leads there: its expectation would have to be stated first
+    if columns[0].startswith("specimen "):  # a body against the scatter of fresh ones
+        own = rows["specimen"].to_numpy() == columns[0].removeprefix("specimen ")
+        flat = lab.bench.forces(rows["N"].to_numpy(), list(rows["sample"]))
+        y = np.log(np.column_stack([lab.bench.static, lab.bench.sliding])[rows.index] / flat)
+        return 2 * min(float(ttest_ind(y[own, k], y[~own, k], equal_var=False).pvalue) for k in (0, 1)) < FOLLOWS
     if columns == ["specimen_run"]:
         cells = np.where(rows["specimen_run"].to_numpy() <= 2, "first", "later")
     else:

@@ -96,8 +96,8 @@ def _mislabelled(b: Bench, size: float, rng: np.random.Generator) -> None:
     moved = {f"{label[0]}{number}": other}
     if rng.random() < 1 / 2:
         moved[f"{other[0]}{number}"] = label
-    samples = [moved.get(s, t) for s, t in zip(b.tests["specimen"], b.tests["sample"], strict=True)]
-    b.remake(b.column("N"), samples)
+    b.tests["true_sample"] = [moved.get(s, t) for s, t in zip(b.tests["specimen"], b.tests["sample"], strict=True)]
+    b.remake(b.column("N"), list(b.tests["true_sample"]))
 
 
 def _operator(b: Bench, size: float, rng: np.random.Generator) -> None:

@@ -302,6 +302,14 @@ def test_of_two_causes_the_one_that_changes_friction_most_is_tested_next(
     assert test.separates == (first,)
 
 
+def test_a_specimen_that_differs_is_pulled_in_turn_with_fresh_ones() -> None:
+    f = expected_fit(hidden(design=LADDER).campaign, TYPICAL, PAPER_LAW, None)
+    test = first_test_of(f, "specimen B3", sample="B")
+    assert next_test_sentence(test) == (
+        f"Pull specimen B3 and fresh specimens of B in turn, at one load: {test.design['pulls']} pulls."
+    )
+
+
 def test_two_columns_that_act_together_are_varied_each_with_each() -> None:
     f = expected_fit(hidden(design=LADDER).campaign, TYPICAL, PAPER_LAW, None)
     test = first_test_of(f, "speed_m_s", "hold_s", sample="B")

@@ -417,6 +417,9 @@ def next_test_sentence(t: NextTest) -> str:
         return f"Pull {design['sample']} {pulls} times in random order with {where}, which were not measured."
     if t.kind == "vary one column":
         column = str(design["covariate"])
+        if column.startswith("specimen "):
+            fresh = f"fresh specimens of {design['sample']}" if "sample" in design else "fresh ones of its sample"
+            return f"Pull {column} and {fresh} in turn, at one load: {pulls} pulls."
         alone = f"Vary {in_words(column)} alone, in random order, on {one_sample} at one load"
         return f"{ALONE.get(column, alone)}: {pulls} pulls."
     if t.kind == "factorial":

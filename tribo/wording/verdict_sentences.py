@@ -235,8 +235,14 @@ def _unknown(v: Verdict) -> str:
             f"The model predicts the wrong friction for {joined(apart)}: measured {OBSERVABLES[largest.observable]} of "
             f"{largest.sample} differs most, by {size_in_words(largest)}; {_by_no_mechanism(v)}."
         )
+    what = sentence_case(OBSERVABLES.get(largest.observable, "friction"))
+    if largest.covariate.startswith("specimen "):
+        return (
+            f"{what} of {largest.covariate} of {largest.sample} differs from the model, and from the other specimens, "
+            f"by {size_in_words(largest)}; {_by_no_mechanism(v)}."
+        )
     return (
-        f"{sentence_case(OBSERVABLES.get(largest.observable, 'friction'))} of {largest.sample or 'all samples'} "
+        f"{what} of {largest.sample or 'all samples'} "
         f"changes with {in_words(largest.covariate)} by {size_in_words(largest)} relative to the model, and "
         f"{_by_no_mechanism(v)}."
     )
@@ -492,6 +498,8 @@ def why_next(v: Verdict) -> str:
         left = 100.0 * v.next_test.design["share_of_width"]
         return f"the interval of the size of {name_in_words(separates[0])} narrows to about {left:.0f} % of its width"
     alone = v.next_test is not None and v.next_test.kind in ("vary one column", "factorial")
+    if alone and separates[0].startswith("specimen "):
+        return f"to see whether {separates[0]} differs from other specimens of its sample"
     if alone or (v.verdict == "unknown" and not of_kind(v, "law")):
         return f"to see whether friction follows {joined(list(map(in_words, separates)))} when nothing else changes"
     for law in of_kind(v, "law"):
