@@ -82,12 +82,12 @@ def test_of_nine_sizes_six_at_least_lie_within_their_intervals() -> None:
 
 
 def test_the_level_is_a_tenth_only_beside_certain_days_and_drift() -> None:
-    assert diagnosed(1, drift).share_of_level == 0.1
+    assert diagnosed(1, drift, small=False).share_of_level == 0.1
     assert diagnosed(1, None, small=True).share_of_level == 1.0
 
 
 def test_the_finding_tells_the_drift() -> None:
-    assert "The series drifts by 6 % (root mean square; " in worded(diagnosed(1, drift).verdict).sentence
+    assert "The series drifts by 6 % (root mean square; " in worded(diagnosed(1, drift, small=False).verdict).sentence
 
 
 @pytest.mark.parametrize(("seed", "small"), first_quick([(1, True), *((seed, False) for seed in SEEDS)]))

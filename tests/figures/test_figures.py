@@ -62,7 +62,7 @@ def test_the_numbers_of_a_figure_are_what_it_draws(name: str, study: Study) -> N
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_study_of_other_samples_is_drawn_too(name: str) -> None:
-    study = make_study(samples=("flat", "grid"), n_samples=60)
+    study = make_study(samples=("flat", "grid"), n_specimens=2, n_samples=60)
     numbers = FIGURES[name].numbers(study)
     assert set(numbers["sample"].dropna()) == {"flat", "grid"}
     assert FIGURES[name].draw(numbers).axes
@@ -74,8 +74,8 @@ def test_a_study_without_a_model_has_no_numbers_for_the_model(name: str, study: 
 
 
 @pytest.mark.parametrize("name", ["fig3", "fig4", "fig6", "fig7", "fig8"])
-def test_a_study_without_a_model_still_shows_the_measurement(name: str, study: Study) -> None:
-    numbers = FIGURES[name].numbers(replace(study, comparison=None, simulated=None, example_runs=()))
+def test_a_study_without_a_model_still_shows_the_measurement(name: str, of_two: Study) -> None:
+    numbers = FIGURES[name].numbers(replace(of_two, comparison=None, simulated=None, example_runs=()))
     assert not numbers.empty
     assert "simulated" not in set(numbers["mark"])
     assert FIGURES[name].draw(numbers).axes
@@ -283,11 +283,11 @@ def test_a_sample_keeps_its_colour_where_others_are_missing(study: Study) -> Non
     assert dict(zip(numbers["sample"], numbers["sample_number"], strict=True))["B"] == 2
 
 
-def test_drawing_leaves_the_settings_of_matplotlib_as_they_were(study: Study) -> None:
+def test_drawing_leaves_the_settings_of_matplotlib_as_they_were(of_two: Study) -> None:
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    FIGURES["fig8"].draw(FIGURES["fig8"].numbers(study))
+    FIGURES["fig8"].draw(FIGURES["fig8"].numbers(of_two))
     assert dict(matplotlib.rcParams) == before
 
 
@@ -312,11 +312,11 @@ def test_an_empty_campaign_has_empty_numbers(study: Study) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_sample_that_could_not_be_fitted_does_not_stop_the_others(name: str, study: Study) -> None:
+def test_a_sample_that_could_not_be_fitted_does_not_stop_the_others(name: str, of_two: Study) -> None:
     nan = np.full(2, np.nan)
     broken = tuple(
         replace(f, values=nan, covariance=np.full((2, 2), np.nan), dof=0.0) if f.sample == "B" else f
-        for f in study.fits
+        for f in of_two.fits
     )
     figure = FIGURES[name]
-    assert figure.draw(figure.numbers(replace(study, fits=broken))).axes
+    assert figure.draw(figure.numbers(replace(of_two, fits=broken))).axes

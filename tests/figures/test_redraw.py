@@ -33,8 +33,8 @@ def test_no_label_lies_on_another_at_the_width_of_one_column_or_of_two(
 
 
 @pytest.mark.parametrize("name", first_quick(FIGURES, 3))
-def test_numbers_read_from_the_file_beside_a_figure_draw_the_same(name: str, study: Study) -> None:
-    numbers = FIGURES[name].numbers(study)
+def test_numbers_read_from_the_file_beside_a_figure_draw_the_same(name: str, of_two: Study) -> None:
+    numbers = FIGURES[name].numbers(of_two)
     again = _numbers(csv_text(numbers))
     first, second = (re.sub(r"\d+\.\d+", "", style.as_svg(FIGURES[name].draw(n))) for n in (numbers, again))
     assert len(first) == pytest.approx(len(second), rel=0.01)

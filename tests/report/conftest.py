@@ -32,10 +32,15 @@ def study() -> Study:
 
 
 @pytest.fixture(scope="session")
-def measured() -> Study:
+def of_two() -> Study:
+    """Two samples, two specimens, short records."""
+    return make_study(samples=("F", "B"), n_specimens=2, n_samples=60)
+
+
+@pytest.fixture(scope="session")
+def measured(of_two: Study) -> Study:
     """Only what was measured on two samples: seven figures that are drawn in little time."""
-    small = make_study(samples=("F", "B"), n_specimens=2, n_samples=60)
-    return replace(small, comparison=None, fits=(), other_fits=(), example_runs=())
+    return replace(of_two, comparison=None, fits=(), other_fits=(), example_runs=())
 
 
 @pytest.fixture(scope="session")

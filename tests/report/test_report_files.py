@@ -80,10 +80,10 @@ def test_a_killed_run_leaves_no_half_written_file_under_a_final_name(tmp_path: P
     ("until", "expected"),
     [("ingest", {"tests.csv"}), ("fit", {"tests.csv", "fits.csv", "other_fits.csv"})],
 )
-def test_a_walk_that_stops_early_writes_less(until: str, expected: set[str], study: Study, tmp_path: Path) -> None:
+def test_a_walk_that_stops_early_writes_less(until: str, expected: set[str], of_two: Study, tmp_path: Path) -> None:
     from dataclasses import replace
 
-    short = replace(study, comparison=None, fits=study.fits if until == "fit" else ())
+    short = replace(of_two, comparison=None, fits=of_two.fits if until == "fit" else ())
     write_until(short, tmp_path, until)
     assert {p.name for p in tmp_path.iterdir()} == expected | {"campaign.nc", "provenance.json"}
 

@@ -21,7 +21,7 @@ from tribo.report.provenance import file_hash, input_names, read_record
 
 
 @pytest.fixture
-def placed(study: Study, tmp_path: Path) -> tuple[Study, Path, Path]:
+def placed(of_two: Study, tmp_path: Path) -> tuple[Study, Path, Path]:
     """A study whose campaign lies on disk, its folder and the folder it is written to."""
     root = tmp_path / "campaign"
     (root / "raw").mkdir(parents=True)
@@ -29,8 +29,8 @@ def placed(study: Study, tmp_path: Path) -> tuple[Study, Path, Path]:
     (root / "tests.csv").write_text("test_id\n")
     for k in (1, 2):
         (root / "raw" / f"T000{k}.csv").write_text(f"{k}\n")
-    campaign = replace(study.ingested.campaign, root=root)
-    only_read = Study(replace(study.ingested, campaign=campaign))
+    campaign = replace(of_two.ingested.campaign, root=root)
+    only_read = Study(replace(of_two.ingested, campaign=campaign))
     out = tmp_path / "out"
     write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "first_peak"}))
     return only_read, root, out
@@ -150,25 +150,25 @@ def outputs(out: Path) -> set[str]:
 
 
 def test_a_later_command_over_the_same_inputs_keeps_what_an_earlier_one_wrote(
-    placed: tuple[Study, Path, Path], study: Study
+    placed: tuple[Study, Path, Path], of_two: Study
 ) -> None:
     only_read, _, out = placed
-    fitted = replace(study, ingested=only_read.ingested, comparison=None)
+    fitted = replace(of_two, ingested=only_read.ingested, comparison=None)
     write_until(fitted, out, "fit", provenance=gather_provenance(fitted, options={"rule": "first_peak", "runs": "4"}))
     assert "fits.csv" in outputs(out)
     write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "first_peak"}))
     assert "fits.csv" in outputs(out)
     assert verify(out).unchanged
     with xr.open_datatree(out / "campaign.nc", engine="h5netcdf") as tree:
-        assert tree["fits"].sizes["fit"] == len(study.fits)
+        assert tree["fits"].sizes["fit"] == len(of_two.fits)
         assert "row_size" in tree["traces"]
 
 
 def test_what_no_longer_holds_is_removed_unless_someone_changed_it(
-    placed: tuple[Study, Path, Path], study: Study
+    placed: tuple[Study, Path, Path], of_two: Study
 ) -> None:
     only_read, _, out = placed
-    fitted = replace(study, ingested=only_read.ingested, comparison=None)
+    fitted = replace(of_two, ingested=only_read.ingested, comparison=None)
     write_until(fitted, out, "fit", provenance=gather_provenance(fitted, options={"rule": "first_peak"}))
     (out / "other_fits.csv").write_text("my own notes\n")
     (out / "mine.txt").write_text("mine\n")
