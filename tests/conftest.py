@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,8 @@ from hypothesis import settings
 from on_the_command_line import run
 from small_lattices import small_lattices
 from support.campaigns import DESIGN, DIALECTS, MadeCampaign, small, write_made
+
+from tribo.records import Ingested
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
@@ -82,6 +85,20 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
         return folder
 
     return made
+
+
+@pytest.fixture(scope="session")
+def example(once: Once) -> Ingested:
+    """The bundled example of 144 tests, read once."""
+    import tribo
+
+    def read(folder: Path) -> None:
+        folder.mkdir()
+        ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+        (folder / "ingested.pickle").write_bytes(pickle.dumps(ingested))
+
+    found: Ingested = pickle.loads((once("example", read) / "ingested.pickle").read_bytes())
+    return found
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import tribo
 from tribo.records import Ingested
 
 
@@ -13,9 +12,8 @@ def with_peaks(ingested: Ingested, peaks: dict[str, float]) -> Ingested:
     return replace(ingested, pulls=pulls)
 
 
-def test_of_two_pulls_as_near_to_the_median_the_first_is_shown_whatever_the_last_digits() -> None:
+def test_of_two_pulls_as_near_to_the_median_the_first_is_shown_whatever_the_last_digits(example: Ingested) -> None:
     """With an even number of pulls two are always equally near, and rounding differs between processors."""
-    example = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
     tests = example.campaign.tests[:4]
     ids = [t.test_id for t in tests]
     for last_digits in (-3e-14, 0.0, 3e-14):
@@ -24,8 +22,7 @@ def test_of_two_pulls_as_near_to_the_median_the_first_is_shown_whatever_the_last
         assert with_peaks(example, peaks).typical(tests[::-1]).test_id == ids[1]
 
 
-def test_a_pull_with_a_flag_stands_for_the_others_only_where_all_have_flags() -> None:
-    example = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+def test_a_pull_with_a_flag_stands_for_the_others_only_where_all_have_flags(example: Ingested) -> None:
     tests = example.campaign.tests[:3]
     ids = [t.test_id for t in tests]
     peaks = with_peaks(example, dict(zip(ids, (1.0, 2.0, 3.0), strict=True)))

@@ -15,10 +15,12 @@ from tribo.stages import with_doubts
 
 
 @pytest.fixture(scope="module")
-def ingested() -> Ingested:
+def ingested(example: Ingested) -> Ingested:
     """Six samples, three specimens, four loads, one repeat."""
-    whole = tribo.load_campaign(tribo.data_dir() / "example")
-    return tribo.ingest(replace(whole, tests=tuple(t for t in whole.tests if t.repeat == 1)))
+    tests = tuple(t for t in example.campaign.tests if t.repeat == 1)
+    read = {t.test_id for t in tests}
+    pulls, traces = ({k: v for k, v in of.items() if k in read} for of in (example.pulls, example.traces))
+    return replace(example, campaign=replace(example.campaign, tests=tests), pulls=pulls, traces=traces)
 
 
 def times(ingested: Ingested, factors: dict[str, float]) -> Ingested:
@@ -121,12 +123,14 @@ def test_forces_that_follow_a_power_of_the_load_are_no_slips(ingested: Ingested)
     assert f"test {tests[-1].test_id} " in doubt.name
 
 
-def test_many_pulls_of_one_sample_that_lie_low_are_one_doubt_with_the_column_they_share() -> None:
-    whole = tribo.load_campaign(tribo.data_dir() / "example")
+def test_many_pulls_of_one_sample_that_lie_low_are_one_doubt_with_the_column_they_share(
+    example: Ingested,
+) -> None:
+    whole = example.campaign
     of_sample = [t.test_id for t in whole.tests if t.sample == "B"]
     first = np.random.default_rng(0).permutation(of_sample)[:8].tolist()
     tests = tuple(replace(t, covariates={"cycle": str(2 - (t.test_id in first))}) for t in whole.tests)
-    many = tribo.ingest(replace(whole, tests=tests))
+    many = replace(example, campaign=replace(whole, tests=tests))
     doubt, *others = sibling_doubts(times(many, dict(zip(first, np.linspace(0.2, 0.4, len(first)), strict=True))))
     assert not others
     assert set(doubt.tests) == set(first)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.signal import lfilter
+from support import first_quick
 
 import tribo
 from tribo import plot
@@ -143,7 +144,7 @@ def test_the_distance_of_running_in_is_read_with_its_interval() -> None:
     assert steady[0].values["force_N"][0] == pytest.approx(4.0, abs=0.03)
 
 
-@pytest.mark.parametrize("share", [0.4, 1.0, 5.0])
+@pytest.mark.parametrize("share", first_quick([0.4, 1.0, 5.0]))
 def test_a_record_that_still_drifts_is_not_called_steady(share: float) -> None:
     states = [r.state for seed in range(12) for r in read(running_in(seed, share, 1.0)) if r.name == "running-in"]
     assert "steady" not in states
