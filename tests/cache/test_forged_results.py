@@ -269,13 +269,14 @@ def test_fifty_kinds_of_forgery_are_tried() -> None:
 
 
 def test_a_conclusion_that_another_user_put_into_kept_does_not_reach_a_report(
-    tmp_path: Path, small_campaign: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The forger has tribo, the campaign and OUT, and signs with a key of his own."""
     from on_the_command_line import run
+    from support.campaigns import small
 
-    out, foreign = tmp_path / "out", tmp_path / "foreign"
-    assert run("fit", small_campaign, "-o", out, "-q").exit_code == 0
+    campaign, out, foreign = small(tmp_path / "campaign", 7), tmp_path / "out", tmp_path / "foreign"
+    assert run("fit", campaign, "-o", out, "-q").exit_code == 0
     true = (out / "fits.csv").read_bytes()
     (tmp_path / "forger").mkdir(mode=0o700)
     monkeypatch.setenv("TRIBO_STATE_DIR", str(tmp_path / "forger"))
@@ -285,12 +286,12 @@ def test_a_conclusion_that_another_user_put_into_kept_does_not_reach_a_report(
     forged = "Forged: this sample is twice as slippery."
     with monkeypatch.context() as patched:
         patched.setattr("tribo.stages.assess", lambda study, options: assessed(study, options, forged))
-        assert forged in run("fit", small_campaign, "-o", foreign, "-q").stdout
+        assert forged in run("fit", campaign, "-o", foreign, "-q").stdout
     monkeypatch.setenv("TRIBO_STATE_DIR", str(tmp_path / "state"))
     kept_results._own_key.cache_clear()
     verified = run("verify", foreign)
     assert "kept/assessment.json was not made by this user on this machine; it is not used" in verified.stdout
-    result = run("fit", small_campaign, "-o", foreign, "-q")
+    result = run("fit", campaign, "-o", foreign, "-q")
     assert forged not in result.stdout
     assert "was not made by this user on this machine; it is made again" in result.stderr
     assert (foreign / "fits.csv").read_bytes() == true

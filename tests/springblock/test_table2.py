@@ -21,9 +21,9 @@ PRESSURES_PA = (3e3, 10e3, 25e3)
 
 @pytest.fixture(scope="module")
 def ensemble() -> pd.DataFrame:
-    """Four stratified angles a sample and pressure."""
+    """Three stratified angles a sample and pressure."""
     base = SimConfig(dt_s=1e-7, rest_tolerance=1e-2, duration_peaks=2.0)
-    table = run_ensemble(stratified_design(list(TABLE2), PRESSURES_PA, 4, base=base))
+    table = run_ensemble(stratified_design(list(TABLE2), PRESSURES_PA, 3, base=base))
     return table.groupby(["sample", "pressure_Pa"])[["static_friction", "sliding_friction"]].mean()
 
 
