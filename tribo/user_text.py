@@ -1,4 +1,6 @@
-"""Text of users: escaped for a terminal, a cell of a spreadsheet or a file name; and the name they may have meant."""
+"""Text of users: escaped for a terminal, a cell of a spreadsheet or a file name; the name they may have meant; numbers
+as they write them.
+"""
 
 from __future__ import annotations
 
@@ -110,3 +112,11 @@ def are_numbers(cells: Sequence[str]) -> bool:
     """Whether a column is one of numbers, whatever words stand in a few of its cells."""
     numbers = sum(map(is_number, cells))
     return numbers > 0 and numbers >= MOSTLY_NUMBERS * sum(map(is_recorded, cells))
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """ "1200", "0.05": at most so many significant digits, never in powers of ten."""
+    rounded = f"{value:.{digits}g}"
+    if "e" not in rounded:
+        return rounded
+    return f"{float(rounded):.0f}" if abs(value) >= 1.0 else f"{float(rounded):.12f}".rstrip("0")

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, strategies as st
 from matplotlib.figure import Figure
 
 from tribo import stages
@@ -22,7 +23,7 @@ from tribo.records import Study
 from tribo.report import tables as result_tables
 from tribo.report.campaign_nc import write_store
 from tribo.report.drawings import draw_all, svg_text
-from tribo.user_text import for_spreadsheet, from_spreadsheet
+from tribo.user_text import for_spreadsheet, from_spreadsheet, plain
 
 IDS = ("001", "1", "1.0", "1e5", "01", "+1", "1e05", "nan", "inf", "None", "True", "-0")
 NAMES = ("=1+1", "@SUM(A1)", "+cmd|' /C calc'!A0", "-2+3", "'=1", "''@x", "'", "-1.5", "+1", "1e5", "plain", "'quoted'")
@@ -123,3 +124,11 @@ def test_a_figure_that_fails_is_replaced_by_its_reason_and_the_others_are_drawn(
     assert "an error in tribo" not in drawn[second].caption
     monkeypatch.setitem(FRICTION_FIGURES, second, replace(FRICTION_FIGURES[second], numbers=empty))
     assert "the numbers of this figure cannot be computed" in draw_all(study)[second].caption
+
+
+@given(st.floats(1e-9, 1e9))
+def test_no_number_of_a_sentence_is_a_power_of_ten(value: float) -> None:
+    said = plain(value)
+    assert "e" not in said
+    assert float(said) == float(f"{value:.3g}")
+    assert plain(-value) == f"-{said}"

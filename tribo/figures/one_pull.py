@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from tribo.comparison import findings
 from tribo.figures import style
 from tribo.records import FloatArray, Pull, Study, Test, Trace
+from tribo.user_text import plain
 
 _STRIP = 0.06  # share of the height of a panel that names the phases
 _LETTER = 0.012  # share of the width of a panel that a small letter takes
@@ -94,7 +95,7 @@ def draw_examples(numbers: pd.DataFrame) -> Figure:
         ax.plot(window["time_s"], window["T_over_peak"], color=style.GREEN, lw=1.4)
         ax.plot(peak["time_s"], peak["T_over_peak"], "v", color=style.VERMILLION, ms=5, clip_on=False)
         first = pull.iloc[0]
-        style.panel_title(ax, first["sample"], f"N = {first['normal_load_N']:.3g} N, test {first['test_id']}")
+        style.panel_title(ax, first["sample"], f"N = {plain(first['normal_load_N'])} N, test {first['test_id']}")
     style.legend_below(
         figure,
         [

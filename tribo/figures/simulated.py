@@ -16,6 +16,7 @@ from tribo.comparison import findings
 from tribo.figures import style
 from tribo.figures.one_pull import thin_trace
 from tribo.records import FloatArray, Run, Study
+from tribo.user_text import plain
 from tribo.wording.numerals import true_minus
 
 PATTERN_COLUMNS = [
@@ -319,7 +320,7 @@ def draw_compared(numbers: pd.DataFrame) -> Figure:
         ]
         ax.text(0.98, 0.96, "\n".join(said), transform=ax.transAxes, ha="right", va="top", fontsize="x-small")
         ax.set_ylim(top=1.25 * float(rows["force_N"].max()))
-        style.panel_title(ax, first["sample"], f"N = {first['normal_load_N']:.3g} N, test {first['test_id']}")
+        style.panel_title(ax, first["sample"], f"N = {plain(first['normal_load_N'])} N, test {first['test_id']}")
     style.legend_below(
         figure,
         [

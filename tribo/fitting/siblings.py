@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tribo.fits import REGIMES
 from tribo.fitting.linear import SAME_LOAD, levels_of
 from tribo.records import Campaign, Doubt, FloatArray, Ingested
+from tribo.user_text import plain
 
 BoolArray = NDArray[np.bool_]
 
@@ -374,9 +375,9 @@ def _of_pulls(
             low, high = expected * math.exp(-reach), expected * math.exp(reach)
             also = "" if len(found[name]) == 1 else ", and the other force as well"
             yield Doubt(
-                "siblings", f"{farther[name]} friction of test {name} ({test.sample} at {test.normal_load_N:.3g} N)",
-                f"{expected * math.exp(deviation):.3g} N, {_far_off(deviation)} {way} its siblings{also}",
-                f"{low:.3g} to {high:.3g} N", f"tests.csv, {test.file}".removesuffix(", "),
+                "siblings", f"{farther[name]} friction of test {name} ({test.sample} at {plain(test.normal_load_N)} N)",
+                f"{plain(expected * math.exp(deviation))} N, {_far_off(deviation)} {way} its siblings{also}",
+                f"{plain(low)} to {plain(high)} N", f"tests.csv, {test.file}".removesuffix(", "),
                 _slip(deviation, group=False), tests=(name,),
             )  # fmt: skip
         elif name == together[0]:

@@ -17,6 +17,7 @@ from tribo.records import PA_PER_KPA, REGIMES, Campaign, Regime, Study
 from tribo.report.crate import conditions
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import pull_cards
+from tribo.user_text import plain
 from tribo.wording import study_sentences as wording
 from tribo.wording.card import Card, card_of, fit_cells
 from tribo.wording.numerals import joined, significant, true_minus
@@ -194,7 +195,8 @@ def budget_tables(study: Study) -> list[dict[str, Any]]:
     order = findings.sample_numbers(study)
     parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
     load_N, campaign = study.ingested.campaign.judged_load_N(), study.ingested.campaign
-    at = f"{campaign.nominal_pressure_Pa(load_N) / PA_PER_KPA:.3g} kPa" if campaign.has_area else f"{load_N:.3g} N"
+    pressure_kPa = plain(campaign.nominal_pressure_Pa(load_N) / PA_PER_KPA) if campaign.has_area else ""
+    at = f"{pressure_kPa} kPa" if campaign.has_area else f"{plain(load_N)} N"
     said = f"contribution of each component to the variance of T at {at}, in percent"
     return [{"caption": said, **_budget_table(regime, part, list(order))} for regime, part in parts if not part.empty]
 

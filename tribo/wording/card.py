@@ -19,6 +19,7 @@ from tribo.diagnostics.verdict import Verdict
 from tribo.display import displayed
 from tribo.mechanisms import MECHANISMS, mechanism
 from tribo.records import PA_PER_KPA, REGIMES, LawFit, Regime, Study
+from tribo.user_text import plain
 from tribo.wording import study_sentences as study_words
 from tribo.wording.numerals import counted, joined, loads_in_words, with_uncertainty
 from tribo.wording.part_sentences import TAKEN_UP, name_in_words, not_varied
@@ -190,7 +191,7 @@ def table2_text(study: Study) -> str:
     load = findings.common_loads(study)[1]
     blocks = [_regime_block(study, regime, load) for regime in REGIMES]
     foot = (
-        f"T at N = {load:.3g} N. After ±: {study_words.uncertainty_kind(study)}.\n"
+        f"T at N = {plain(load)} N. After ±: {study_words.uncertainty_kind(study)}.\n"
         "mu and tau0 of a fit are correlated: compare T rather than mu or tau0 alone."
     )
     return "\n\n".join([*(b for b in blocks if b), foot])

@@ -14,6 +14,7 @@ from tribo.lawsearch.grammar import ALL, BOTH, CAVITY_SHARE, ELONGATION, FLAT, P
 from tribo.lawsearch.known_laws import SHOWS, PlannedLaw, Untested, Validation
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.search import Discovery
+from tribo.user_text import plain
 from tribo.vocabulary import described, in_words
 from tribo.wording.numerals import general, interval, p_text, signed
 
@@ -206,7 +207,7 @@ def law_test(difference: Difference, law: WrittenLaw, other: WrittenLaw, design:
         return f"{vary} on sample {design['sample']} alone, at one load"
     if difference == "terms":
         low, high = design["normal_load_N"]
-        return f"{vary} at {low:.3g} N and at {high:.3g} N alone"
+        return f"{vary} at {plain(low)} N and at {plain(high)} N alone"
     if difference == "regimes":
         regime = next(r for r in (law.regime, other.regime) if r != BOTH)
         again = vary if days else f"Repeat pulls at the lowest and the highest value of {words}"

@@ -17,6 +17,7 @@ from tribo.lawsearch.known_laws import KnownLaw
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.mechanisms import MECHANISMS, mechanism
 from tribo.mechanisms.record import Mechanism, TraceEvidence
+from tribo.user_text import plain
 from tribo.vocabulary import OBSERVABLES, described, in_words
 from tribo.wording.law_sentences import each_value, law_sentence, law_test, size_sentence, tied_laws
 from tribo.wording.numerals import (
@@ -222,7 +223,7 @@ def layer_sentence(layer: Layer) -> str:
 def change_over_range(over: Mapping[str, Any]) -> str:
     """ "+25 % (90 % interval +22 to +29 %) as the pull speed rises from 0.05 to 0.8 mm/s"."""
     words = described(over["column"])
-    start, end = (f"{words.factor * over[key]:.3g}" for key in ("from", "to"))
+    start, end = (plain(words.factor * over[key]) for key in ("from", "to"))
     sizes = [signed(over[key]) for key in ("percent", "low", "high")]
     return (
         f"{sizes[0]} % (90 % interval {sizes[1]} to {sizes[2]} %) as {words.words} rises from {start} to "
@@ -235,7 +236,7 @@ def place(layer: Layer) -> str:
     if layer.most is None:
         return layer.at
     regime, sample, load_N = layer.most
-    return f"{regime} friction of {sample} at {load_N:.3g} N"
+    return f"{regime} friction of {sample} at {plain(load_N)} N"
 
 
 def _own_law(layer: Layer) -> str:
@@ -254,10 +255,10 @@ def _own_law(layer: Layer) -> str:
     if constant.value < 0.0:
         return f"{said} A straight line falls to {_sized(constant)} at zero load: friction is weak at small loads."
     if "T0" in layer.parameters:
-        return f"{said} At {load_N:.3g} N, T₀ is {share_percent:.0f} % of T."
+        return f"{said} At {plain(load_N)} N, T₀ is {share_percent:.0f} % of T."
     return (
         f"{said} A straight line leaves {_sized(constant)} at zero load: {share_percent:.0f} % of T at "
-        f"{load_N:.3g} N does not depend on the load."
+        f"{plain(load_N)} N does not depend on the load."
     )
 
 
@@ -405,14 +406,14 @@ def next_test_sentence(t: NextTest) -> str:
     if t.kind == "remove":
         return f"{sentence_case(mechanism(design['without']).removed_by)}: {pulls} pulls of {design['sample']}."
     if t.kind == "pull further":
-        return f"{pulls} further pulls of {design['sample']} at {design['normal_load_N']:.3g} N."
+        return f"{pulls} further pulls of {design['sample']} at {plain(design['normal_load_N'])} N."
     if t.kind == "pull more":
         loads, samples = design["normal_loads_N"], design["samples"]
         shared = ", shared equally and in random order" if len(loads) * len(samples) > 1 else ""
-        return f"{pulls} further pulls of {joined(samples)} at {joined([f'{load:.3g}' for load in loads])} N{shared}."
+        return f"{pulls} further pulls of {joined(samples)} at {joined(list(map(plain, loads)))} N{shared}."
     if t.kind == "confirm":
         words = described(str(design["covariate"]))
-        values = joined([f"{value * words.factor:.3g}" for value in design["values"]])
+        values = joined([plain(value * words.factor) for value in design["values"]])
         where = f"{in_words(str(design['covariate']))} at {values} {words.unit}"
         return f"Pull {design['sample']} {pulls} times in random order with {where}, which were not measured."
     if t.kind == "vary one column":

@@ -14,6 +14,7 @@ from tribo.diagnostics.column_search import ColumnEffect
 from tribo.diagnostics.verdict import Verdict as Found
 from tribo.diagnostics.without_model import SERIES
 from tribo.records import PA_PER_KPA, REGIMES, Campaign, LawFit, Override, Pull, Study, Test
+from tribo.user_text import plain
 from tribo.vocabulary import label_with_unit
 from tribo.wording.numerals import (
     counted,
@@ -425,7 +426,7 @@ def _dependence(study: Study, said: Collection[tuple[str, str]]) -> Iterator[str
     if clear.empty:
         yield "T/N varies significantly with no recorded variable (rank correlations, adjusted for their number)."
     for row in _rows(clear.head(MOST_SAID)):
-        change = f": {percent(row['change_percent'] / 100)} from {row['low']:.3g} to {row['high']:.3g}"
+        change = f": {percent(row['change_percent'] / 100)} from {plain(row['low'])} to {plain(row['high'])}"
         if (row["regime"], row["variable"]) in said or row["change_percent"] * row["rank"] < 0:
             change = ""  # the diagnosis states it, or a line and the ranks contradict each other
         yield (

@@ -28,6 +28,7 @@ from tribo.diagnostics.verdict import (
 )
 from tribo.diagnostics.without_model import ColumnsTested
 from tribo.mechanisms.record import TraceEvidence
+from tribo.user_text import plain
 from tribo.vocabulary import OBSERVABLES, described, in_words, short_label
 from tribo.wording.law_sentences import across_sentence, held_sentence, tied_laws
 from tribo.wording.numerals import (
@@ -490,7 +491,7 @@ def why_next(v: Verdict) -> str:
         words = described(str(design["covariate"]))
         low, *_, high = (value * words.factor for value in design["values"])
         change = f"{signed(design['expected_percent'])} %"
-        over = f"{design['regime']} friction from {low:.3g} to {high:.3g} {words.unit}"
+        over = f"{design['regime']} friction from {plain(low)} to {plain(high)} {words.unit}"
         return f"{name_in_words(separates[0])} predicts {change} in {over}"
     if v.next_test is not None and len(separates) == 1 and v.next_test.kind in ("measure", "remove"):
         return f"it settles whether {name_in_words(separates[0])} is the cause"
