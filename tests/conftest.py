@@ -109,6 +109,12 @@ def small_campaign(once: Once) -> Path:
 
 
 @pytest.fixture(scope="session")
+def eight_pulls(once: Once) -> Path:
+    """A campaign of as few pulls as can be: samples F and B, two specimens, two loads."""
+    return once("eight", lambda folder: small(folder / "campaign", 7, title="small")) / "campaign"
+
+
+@pytest.fixture(scope="session")
 def small_report(small_campaign: Path, once: Once) -> Path:
     """`tribo report` on the small campaign; what it said with --json lies beside its folder."""
 

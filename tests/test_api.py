@@ -55,12 +55,12 @@ def test_importing_tribo_imports_none_of_the_heavy_libraries() -> None:
     assert seen.stdout.strip() == "[]"
 
 
-def test_three_lines_of_python_give_the_numbers_of_tribo_fit(small_campaign: Path, tmp_path: Path) -> None:
+def test_three_lines_of_python_give_the_numbers_of_tribo_fit(eight_pulls: Path, tmp_path: Path) -> None:
     from click.testing import CliRunner
 
-    ingested = tribo.ingest(tribo.load_campaign(small_campaign))
+    ingested = tribo.ingest(tribo.load_campaign(eight_pulls))
     fits = {(f.sample, f.regime): f.value("mu") for f in tribo.fit(ingested)}
-    CliRunner().invoke(main, ["fit", str(small_campaign), "-o", str(tmp_path), "-q"])
+    CliRunner().invoke(main, ["fit", str(eight_pulls), "-o", str(tmp_path), "-q"])
     import pandas as pd
 
     table = pd.read_csv(tmp_path / "fits.csv").set_index(["sample", "regime"])["mu"]
@@ -92,13 +92,13 @@ def test_the_fifteen_lines_of_the_tutorial_run_as_written_and_give_what_the_repo
 
 
 def test_a_law_that_the_model_cannot_run_with_leaves_the_fits_and_says_so(
-    small_campaign: Path, monkeypatch: pytest.MonkeyPatch
+    eight_pulls: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(*_: Any, **__: Any) -> Study:
         raise SimulationError(Problem("too_short", "the run ends too early", column="duration_s"))
 
     monkeypatch.setattr(stages, "compare", refused)
-    study = stages.study(load_campaign(small_campaign), until="compare")
+    study = stages.study(load_campaign(eight_pulls), until="compare")
     assert study.comparison is None
     assert len(study.fits) == 4
     assert any("cannot be run with the friction law of the flat sample" in note for note in study.notes)

@@ -18,7 +18,7 @@ from tribo.input_files import toml_table
 from tribo.records import Ingested
 
 QUICK = settings(
-    max_examples=60, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck),
+    max_examples=30, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck),
     phases=[Phase.generate],
 )  # fmt: skip
 KINDS = {

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from support.campaigns import FLAT_TOML, written
 
+import tribo
 from tribo.campaign import load_campaign
 from tribo.campaign.load import with_zeros
 from tribo.cli import main
@@ -32,6 +33,8 @@ def campaign(folder: Path, of_campaign: str = "", of_test: str = "") -> Path:
 
 
 def zeros(folder: Path, out: Path, *options: str) -> list[float]:
+    if not options:
+        return [pull.zero_N for pull in tribo.ingest(load_campaign(folder)).pulls.values()]
     result = CliRunner().invoke(main, ["ingest", str(folder), "-o", str(out), *options])
     assert result.exit_code == 0, result.output
     return list(pd.read_csv(out / "tests.csv")["zero_N"])

@@ -18,9 +18,9 @@ QUICK = ("--blocks", 45, "--dt", 1e-7, "--set", "rest_tolerance=0.01", "--set", 
 
 
 @pytest.fixture
-def lab(small_campaign: Path, tmp_path: Path) -> Path:
+def lab(eight_pulls: Path, tmp_path: Path) -> Path:
     """A folder that holds a campaign, in a folder of its own."""
-    shutil.copytree(small_campaign, tmp_path / "lab" / "campaign")
+    shutil.copytree(eight_pulls, tmp_path / "lab" / "campaign")
     return tmp_path / "lab"
 
 
@@ -91,21 +91,21 @@ def test_a_zip_is_not_written_around(lab: Path) -> None:
     assert digest(lab) == before
 
 
-def test_no_command_writes_into_another_campaign(lab: Path, small_campaign: Path) -> None:
+def test_no_command_writes_into_another_campaign(lab: Path, eight_pulls: Path) -> None:
     before = digest(lab)
-    result = run("fit", small_campaign, "-o", lab / "campaign" / "out", "--force")
+    result = run("fit", eight_pulls, "-o", lab / "campaign" / "out", "--force")
     assert result.exit_code == 1
     assert "lies in the campaign" in result.stderr
     assert digest(lab) == before
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_folder_with_files_of_others_is_refused_as_it_is(small_campaign: Path, tmp_path: Path, command: str) -> None:
+def test_a_folder_with_files_of_others_is_refused_as_it_is(eight_pulls: Path, tmp_path: Path, command: str) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "tests.csv").write_text("mine\n")
     (tmp_path / "out" / "letter.txt").write_text("mine too\n")
     before = digest(tmp_path)
-    result = run(command, small_campaign, "-o", tmp_path / "out")
+    result = run(command, eight_pulls, "-o", tmp_path / "out")
     assert result.exit_code == 1
     assert "letter.txt, tests.csv" in result.stderr
     assert "--force" in result.stderr
@@ -116,32 +116,32 @@ def test_a_dry_run_refuses_the_folder_that_the_run_would_refuse(lab: Path) -> No
     assert run("report", lab / "campaign", "-o", lab, "--dry-run").exit_code == 1
 
 
-def test_with_force_results_stand_among_files_of_others(small_campaign: Path, tmp_path: Path) -> None:
+def test_with_force_results_stand_among_files_of_others(eight_pulls: Path, tmp_path: Path) -> None:
     (tmp_path / "letter.txt").write_text("mine\n")
     (tmp_path / "tests.csv").write_text("mine\n")
-    assert run("ingest", small_campaign, "-o", tmp_path, "--force").exit_code == 0
+    assert run("ingest", eight_pulls, "-o", tmp_path, "--force").exit_code == 0
     assert (tmp_path / "letter.txt").read_text() == "mine\n"
     assert (tmp_path / "tests.csv").read_text().startswith("test_id,")
 
 
-def test_results_are_written_again_into_their_own_folder_and_beside_notes(small_campaign: Path, tmp_path: Path) -> None:
-    assert run("ingest", small_campaign, "-o", tmp_path / "out").exit_code == 0
+def test_results_are_written_again_into_their_own_folder_and_beside_notes(eight_pulls: Path, tmp_path: Path) -> None:
+    assert run("ingest", eight_pulls, "-o", tmp_path / "out").exit_code == 0
     (tmp_path / "out" / "overrides.csv").write_text("test_id,action,reason\n")
-    assert run("ingest", small_campaign, "-o", tmp_path / "out").exit_code == 0
+    assert run("ingest", eight_pulls, "-o", tmp_path / "out").exit_code == 0
     assert (tmp_path / "out" / "overrides.csv").is_file()
 
 
-def test_a_file_of_a_users_own_beside_results_is_not_replaced(small_campaign: Path, tmp_path: Path) -> None:
-    assert run("ingest", small_campaign, "-o", tmp_path / "out").exit_code == 0
+def test_a_file_of_a_users_own_beside_results_is_not_replaced(eight_pulls: Path, tmp_path: Path) -> None:
+    assert run("ingest", eight_pulls, "-o", tmp_path / "out").exit_code == 0
     (tmp_path / "out" / "fits.csv").write_text("mine\n")
-    result = run("fit", small_campaign, "-o", tmp_path / "out")
+    result = run("fit", eight_pulls, "-o", tmp_path / "out")
     assert result.exit_code == 1
     assert "'fits.csv'" in result.stderr
     assert (tmp_path / "out" / "fits.csv").read_text() == "mine\n"
 
 
-def test_a_finished_run_leaves_neither_lock_nor_mark(small_campaign: Path, tmp_path: Path) -> None:
-    run("ingest", small_campaign, "-o", tmp_path / "out")
+def test_a_finished_run_leaves_neither_lock_nor_mark(eight_pulls: Path, tmp_path: Path) -> None:
+    run("ingest", eight_pulls, "-o", tmp_path / "out")
     assert [p.name for p in (tmp_path / "out").iterdir() if p.name.startswith(".")] == []
 
 
@@ -193,11 +193,11 @@ def test_a_simulation_is_not_written_into_a_campaign(lab: Path) -> None:
 
 @pytest.mark.parametrize("site", ["drop", "drop/site", "drop/campaign/site", "", "link", "elsewhere/campaign/site"])
 def test_a_site_is_not_built_in_or_around_the_folder_of_campaigns(
-    small_campaign: Path, tmp_path: Path, site: str
+    eight_pulls: Path, tmp_path: Path, site: str
 ) -> None:
     pytest.importorskip("snakemake")
-    shutil.copytree(small_campaign, tmp_path / "drop" / "campaign")
-    shutil.copytree(small_campaign, tmp_path / "elsewhere" / "campaign")
+    shutil.copytree(eight_pulls, tmp_path / "drop" / "campaign")
+    shutil.copytree(eight_pulls, tmp_path / "elsewhere" / "campaign")
     (tmp_path / "drop" / "other").symlink_to(tmp_path / "elsewhere" / "campaign")
     (tmp_path / "link").symlink_to(tmp_path / "drop")
     before = digest(tmp_path)

@@ -26,9 +26,9 @@ def allow_forks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 
-def test_two_processes_read_the_same_bits_as_one(monkeypatch, small_campaign: Path) -> None:  # type: ignore[no-untyped-def]
+def test_two_processes_read_the_same_bits_as_one(monkeypatch, eight_pulls: Path) -> None:  # type: ignore[no-untyped-def]
     allow_forks(monkeypatch)
-    campaign = load_campaign(small_campaign)
+    campaign = load_campaign(eight_pulls)
     monkeypatch.setattr(exports, "FEWEST_FOR_PROCESSES", len(campaign.tests))
     one, two = stages.ingest(campaign), stages.ingest(campaign, jobs=2)
     assert list(one.pulls) == list(two.pulls)
@@ -38,13 +38,13 @@ def test_two_processes_read_the_same_bits_as_one(monkeypatch, small_campaign: Pa
 
 
 def test_faults_come_back_from_the_processes_too(
-    monkeypatch: pytest.MonkeyPatch, small_campaign: Path, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, eight_pulls: Path, tmp_path: Path
 ) -> None:
     import shutil
 
     allow_forks(monkeypatch)
     monkeypatch.setattr(exports, "FEWEST_FOR_PROCESSES", 2)
-    shutil.copytree(small_campaign, tmp_path / "campaign")
+    shutil.copytree(eight_pulls, tmp_path / "campaign")
     (tmp_path / "campaign" / "raw" / "T005.csv").write_bytes(b"")
     ingested = stages.ingest(load_campaign(tmp_path / "campaign"), jobs=2)
     (fault,) = ingested.set_aside
@@ -65,14 +65,14 @@ def test_a_displacement_that_does_not_run_at_the_speed_of_the_test_is_doubted() 
 
 
 def test_a_doubt_stands_in_the_table_with_its_row_and_can_be_found_on_the_trace(
-    small_campaign: Path, tmp_path: Path
+    eight_pulls: Path, tmp_path: Path
 ) -> None:
     import shutil
 
     from tribo.records import Study
     from tribo.report.tables import tests_table
 
-    shutil.copytree(small_campaign, tmp_path / "campaign")
+    shutil.copytree(eight_pulls, tmp_path / "campaign")
     path = tmp_path / "campaign" / "raw" / "T005.csv"
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     row = len(lines) - 60

@@ -17,9 +17,9 @@ from tribo.report import gather_provenance
 
 
 @pytest.fixture
-def folder(small_campaign: Path, tmp_path: Path) -> Path:
+def folder(eight_pulls: Path, tmp_path: Path) -> Path:
     copy = tmp_path / "campaign"
-    shutil.copytree(small_campaign, copy)
+    shutil.copytree(eight_pulls, copy)
     return copy
 
 
@@ -55,7 +55,7 @@ BAD = {
 def test_an_export_of_odd_numbers_costs_no_other_test(folder: Path, content: str) -> None:
     ingested = spoil(folder, content)
     spoiled = ingested.campaign.tests[1].test_id
-    assert len(set(ingested.pulls) - {spoiled}) == 23
+    assert len(set(ingested.pulls) - {spoiled}) == 7
     for fault in ingested.set_aside:
         assert fault.test_id == spoiled
         assert not any(p.kind == "unexpected" for p in fault.problems), fault.reason
@@ -79,7 +79,7 @@ def test_an_exception_while_evaluating_one_export_is_the_fault_of_that_test(
     (fault,) = ingested.set_aside
     assert fault.test_id == bad
     assert "this export cannot be evaluated because of an error in tribo (ZeroDivisionError: division" in fault.reason
-    assert len(ingested.pulls) == 23
+    assert len(ingested.pulls) == 7
 
 
 def test_the_provenance_holds_the_hashes_of_the_bytes_that_were_read(folder: Path) -> None:
