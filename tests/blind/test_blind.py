@@ -45,7 +45,8 @@ def test_a_campaign_without_an_effect_is_said_to_have_none(tmp_path: Path, seed:
 @pytest.mark.parametrize(
     ("effect", "design"),
     first_quick(
-        [("velocity_dependence", OF_TWO), ("run_in", QUICK), ("contact_area_loss", LOADS), ("velocity_dependence", LADDER), ("load_cell_offset", QUICK)]
+        [("velocity_dependence", OF_TWO), ("run_in", QUICK), ("contact_area_loss", LOADS),
+         ("velocity_dependence", LADDER), ("load_cell_offset", QUICK)]
     ),
 )
 def test_a_clear_effect_is_named(tmp_path: Path, effect: str, design: Design) -> None:
