@@ -6,6 +6,7 @@ import os
 import pickle
 import zipfile
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import pandas as pd
@@ -92,12 +93,25 @@ def example(once: Once) -> Ingested:
     """The bundled example of 144 tests, read once."""
     import tribo
 
+    return read_once(once, "example", lambda: tribo.data_dir() / "example")
+
+
+@pytest.fixture(scope="session")
+def read_made(once: Once, made: Callable[[str], MadeCampaign]) -> Callable[[str], Ingested]:
+    """read_made("bluehill") -> a campaign of the virtual tribometer in that dialect, every export read, once."""
+    return lru_cache(lambda dialect: read_once(once, f"read_{dialect}", lambda: made(dialect).folder))
+
+
+def read_once(once: Once, name: str, campaign: Callable[[], Path]) -> Ingested:
+    """What is read of a campaign, the same in every process of this run of the tests."""
+    import tribo
+
     def read(folder: Path) -> None:
         folder.mkdir()
-        ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+        ingested = tribo.ingest(tribo.load_campaign(campaign()))
         (folder / "ingested.pickle").write_bytes(pickle.dumps(ingested))
 
-    found: Ingested = pickle.loads((once("example", read) / "ingested.pickle").read_bytes())
+    found: Ingested = pickle.loads((once(name, read) / "ingested.pickle").read_bytes())
     return found
 
 

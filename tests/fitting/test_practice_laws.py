@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from other_fits import fit_power_law
 from support import first_quick
-from support.campaigns import DESIGN, DIALECTS, LAWS, MadeCampaign, write_made
+from support.campaigns import DESIGN, DIALECTS, LAWS, write_made
 from support.sled import SledLaw
 
 from tribo.campaign import load_campaign
@@ -35,12 +34,6 @@ class Pressed(SledLaw):
         return static, sliding + self.sliding_mu * bend
 
 
-@pytest.fixture(scope="module")
-def read(made: Callable[[str], MadeCampaign]) -> Read:
-    """read("bluehill") -> a campaign of the virtual tribometer in that dialect, every export read."""
-    return lru_cache(lambda dialect: ingest(load_campaign(made(dialect).folder)))
-
-
 def flat(ingested: Ingested, regime: Regime) -> LawFit:
     fits = fit_samples(ingested.table(), regime, ingested.campaign.nominal_area_m2)
     return next(fit for fit in fits if fit.sample == "F")
@@ -59,8 +52,10 @@ def outside(ingested: Ingested, law: dict[str, float]) -> list[str]:
 
 
 @pytest.mark.parametrize("dialect", first_quick(DIALECTS))
-def test_the_flat_law_of_the_virtual_tribometer_lies_within_the_99_percent_intervals(read: Read, dialect: str) -> None:
-    assert outside(read(dialect), vars(LAWS["F"])) == []
+def test_the_flat_law_of_the_virtual_tribometer_lies_within_the_99_percent_intervals(
+    read_made: Read, dialect: str
+) -> None:
+    assert outside(read_made(dialect), vars(LAWS["F"])) == []
 
 
 @pytest.mark.slow
@@ -125,17 +120,17 @@ def test_the_practice_campaign_with_hidden_pressure_dependence_bends_and_the_one
         assert low[0] < 0 < low[1]
 
 
-def test_specimens_pulled_along_x_and_y_are_counted_once_in_the_three_term_law(read: Read) -> None:
-    campaign = read("bluehill").campaign
+def test_specimens_pulled_along_x_and_y_are_counted_once_in_the_three_term_law(read_made: Read) -> None:
+    campaign = read_made("bluehill").campaign
     fractions = {sample: campaign.area_fraction(sample) for sample in campaign.samples}
-    fit = fit_three_term(read("bluehill").table(), "static", campaign.nominal_area_m2, fractions)
+    fit = fit_three_term(read_made("bluehill").table(), "static", campaign.nominal_area_m2, fractions)
     assert fit.n_specimens == 15
     assert fit.n_tests == 180
     assert fit.value("a_Pa") > 0
 
 
-def test_every_fit_of_a_campaign_gets_a_budget_with_the_clip_from_its_own_traces(read: Read) -> None:
-    ingested = read("bluehill")
+def test_every_fit_of_a_campaign_gets_a_budget_with_the_clip_from_its_own_traces(read_made: Read) -> None:
+    ingested = read_made("bluehill")
     area = ingested.campaign.nominal_area_m2
     fits = tuple(f for r in ("static", "sliding") for f in fit_samples(ingested.table(), r, area))
     budgets = campaign_budgets(ingested, fits)
@@ -147,8 +142,8 @@ def test_every_fit_of_a_campaign_gets_a_budget_with_the_clip_from_its_own_traces
         assert np.isfinite(fit.interval("mu")).all()
 
 
-def test_the_power_of_a_campaign_follows_from_its_own_table(read: Read) -> None:
-    ingested = read("bluehill")
+def test_the_power_of_a_campaign_follows_from_its_own_table(read_made: Read) -> None:
+    ingested = read_made("bluehill")
     found = power_of_campaign(ingested.table(), "static", ingested.campaign.nominal_area_m2)
     assert list(found["number"]) == ["mu", "tau0_kPa", "T_N"]
     assert found["smallest_difference_pct"].between(5, 100).all()

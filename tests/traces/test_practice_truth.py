@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from support.campaigns import DIALECTS, MadeCampaign
 from tribo import read_pull
 from tribo.errors import TriboError
 from tribo.readers import read_export
-from tribo.records import Pull
+from tribo.records import Ingested, Pull
 
 TRACE_KINDS = {"stopped_before_peak", "sign_flipped", "saturated"}
 
@@ -48,9 +47,9 @@ def disagreements(pulls: dict[str, Pull], truth: pd.DataFrame) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def made_pulls(made: Callable[[str], MadeCampaign]) -> Callable[[str], dict[str, Pull]]:
+def made_pulls(read_made: Callable[[str], Ingested]) -> Callable[[str], dict[str, Pull]]:
     """made_pulls("bluehill") -> the pulls of the campaign of the virtual tribometer in that dialect, read once."""
-    return lru_cache(lambda dialect: pulls_of(made(dialect).folder))
+    return lambda dialect: dict(read_made(dialect).pulls)
 
 
 @pytest.mark.parametrize("dialect", first_quick(DIALECTS))
