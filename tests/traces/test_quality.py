@@ -186,7 +186,7 @@ def test_a_sharp_apex_and_stick_slip_are_no_spikes() -> None:
 finite = st.floats(-1e6, 1e6)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     force=st.one_of(
         st.lists(finite, min_size=20, max_size=300),
