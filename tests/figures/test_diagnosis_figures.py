@@ -19,9 +19,10 @@ from figures.test_figures import collisions
 from tribo.diagnostics import Diagnosis
 from tribo.diagnostics.fit import fit, residual_on_flat
 from tribo.diagnostics.model import PATTERN
-from tribo.diagnostics.verdict import Layer
+from tribo.diagnostics.verdict import Layer, Misfit
 from tribo.figures import evidence, extended_model, misfit, residuals, style
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
+from tribo.figures.misfit import misfit_numbers
 from tribo.figures.residuals import draw_finding, finding_numbers
 from tribo.figures.style import house_style
 from tribo.lawsearch.grammar import Shape, WrittenLaw
@@ -123,6 +124,14 @@ def test_a_figure_that_says_the_opposite_is_noticed(
     for said, d in wrong.items():
         assert any(said in text for text in contradictions(d)), said
     assert any("no misfit, and p" in text for text in contradictions(wrong["bars name"]))
+
+
+def test_the_heat_map_marks_a_mean_that_the_verdict_tells_beside_its_causes(nothing: Diagnosis) -> None:
+    """The mean of the flat sample too, which the calibration takes up as long as no cause is at work."""
+    left = tuple(Misfit("sliding", sample, "sample", size, 0.003) for sample, size in (("F", -8.1), ("B", 23.2)))
+    cells = misfit_numbers(replace(nothing, verdict=replace(nothing.verdict, verdict="partly", misfits=left)))
+    marked = cells[(cells["covariate"] == "mean") & (cells["mark"] != "")].set_index(["row", "observable"])
+    assert dict(marked["effect_percent"]) == {("F", "sliding"): -8.1, ("B", "sliding"): 23.2}
 
 
 def with_law_of(d: Diagnosis, *columns: str) -> Diagnosis:

@@ -135,11 +135,12 @@ def misfit_numbers(d: Diagnosis) -> pd.DataFrame:
 
     The model is the one calibrated on the flat sample alone. The column "mean" is the geometric mean over a sample of
     measured over modelled T, less one, in percent; the flat sample has neither a mean nor a change with load, since the
-    calibration absorbs both.
+    calibration absorbs both, but where the verdict tells of its mean beside a cause.
     ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
     and the specimens are taken out; ``p_adjusted`` sets it against the strongest contrast of simulated campaigns. The
     size and the p of a mean are those of the verdict where the patterned samples differ from the model by more than its
-    stated error; of both regimes together the geometric mean and the larger p.
+    stated error, or where it is a misfit beside the causes; of both regimes together the geometric mean and the
+    larger p.
     The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
     stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
     """
@@ -156,11 +157,12 @@ def _cells(d: Diagnosis, columns: list[Covariate], observable: str, residual: Fl
     sample = f.setup.observations.conditions.sample
     samples = sorted(set(sample.tolist()), key=lambda s: (s != flat, s))
     taken_up = {ALL: ("mean",), flat: ("mean", "normal_load_N")}  # by the flat law and the model's error of a sample
+    told = _told_means(d)
     cells, shapes = [], []
     for row in (*samples, ALL):
         here = np.ones(len(sample), bool) if row == ALL else sample == row
         for column in columns:
-            if column.name in taken_up.get(row, ()):
+            if column.name in taken_up.get(row, ()) and not (column.name == "mean" and (row, observable) in told):
                 continue
             shape = _shape(column, here)
             if np.ptp(shape) <= 1e-9:
@@ -168,17 +170,28 @@ def _cells(d: Diagnosis, columns: list[Covariate], observable: str, residual: Fl
             cells.append((row, column, _end_to_end(column, residual[here], here)))
             shapes.append(shape)
     strength = _strengths(f, np.column_stack(shapes), observable)
-    of_patterns = {(c.name, r): (c.p_adjusted, c.effect_percent) for c in pattern_differences(d) for r in c.regimes}
     found = []
     for (row, column, effect), z in zip(cells, strength, strict=True):
         p = d.screened.p_adjusted(abs(float(z)))
         if column.name == "mean" and observable != "drop":
             about = [r for r in ("static", "sliding") if observable in (r, "both")]
-            if told := [of_patterns[row, r] for r in about if (row, r) in of_patterns]:
-                p = max(chance for chance, _ in told)
-                effect = float(percent(np.mean([np.log1p(size / 100.0) for _, size in told])))
+            known = [told[row, r] for r in about if (row, r) in told]
+            if len(known) == len(about):
+                p = max(chance for chance, _ in known)
+                effect = float(percent(np.mean([np.log1p(size / 100.0) for _, size in known])))
         found.append(_cell(observable, row, column, effect, float(z), p))
     return found
+
+
+def _told_means(d: Diagnosis) -> dict[tuple[str, str], tuple[float, float]]:
+    """The p value and the size of the mean difference of a sample and regime, where the verdict tells them: as one of
+    the patterned samples, or as a misfit that is left beside the causes."""
+    of_misfits = {
+        (m.sample, m.observable): (m.p_adjusted, m.effect_percent)
+        for m in d.verdict.misfits if m.covariate == "sample" and m.observable in ("static", "sliding")
+    }  # fmt: skip
+    of_patterns = {(c.name, r): (c.p_adjusted, c.effect_percent) for c in pattern_differences(d) for r in c.regimes}
+    return of_misfits | of_patterns
 
 
 def pattern_differences(d: Diagnosis) -> list[Layer]:
