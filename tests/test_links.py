@@ -13,8 +13,9 @@ from tribo.campaign import load_campaign, open_campaign
 from tribo.errors import CampaignError, TriboError
 from tribo.files import LEADS_OUT, leads_out
 from tribo.ingestion.overrides import apply_overrides
+from tribo.own_folder import place_problems
 from tribo.report.provenance import file_hash, input_names, verify
-from tribo.site.scan import scan
+from tribo.site.scan import LEADS_NOWHERE, scan
 
 SECRET = "secret-name,secret content\n"
 
@@ -133,6 +134,17 @@ def test_a_campaign_of_a_drop_folder_that_is_a_link_is_not_looked_into(campaign:
         "packed": ((LEADS_OUT,), None),
     }
     assert "secret" not in "".join(everything_said(drop))
+
+
+@pytest.mark.parametrize("target", ["nothing", "astray"])
+def test_a_link_of_a_drop_folder_that_leads_nowhere_is_refused_and_stops_no_build(tmp_path: Path, target: str) -> None:
+    """To something that is not there, and to itself."""
+    drop = tmp_path / "drop"
+    drop.mkdir()
+    (drop / "astray").symlink_to(target)
+    (looked_at,) = scan(drop, 0.0)
+    assert (looked_at.name, looked_at.refused) == ("astray", (LEADS_NOWHERE,))
+    assert place_problems(tmp_path / "site", (drop, drop / "astray")) == []
 
 
 def test_files_behind_links_of_a_campaign_in_a_drop_folder_are_not_hashed(campaign: Path, elsewhere: Path) -> None:

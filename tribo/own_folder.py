@@ -215,15 +215,20 @@ def place_problems(target: Path, inputs: Sequence[Path] = ()) -> list[Problem]:
     """Why nothing may be written at ``target``, links resolved: it is, holds or lies in something that is read."""
     allowed = "a folder outside of every campaign"
     for given in inputs:
-        if how := _relation(target.resolve(), given.resolve()):
+        if how := _relation(_real(target), _real(given)):
             what = f"results must not be written here: it {how} {given}"
             return [Problem("out_in_input", what, file=str(target), allowed=allowed)]
-    place = target.resolve()
+    place = _real(target)
     around = [folder for folder in (place, *place.parents) if (folder / CAMPAIGN_FILE).is_file()]
     if around:
         what = f"results must not be written here: it is or lies in the campaign {around[0]}"
         return [Problem("out_in_campaign", what, file=str(target), allowed=allowed)]
     return []
+
+
+def _real(path: Path) -> Path:
+    """A path with its links followed; one of links in a circle, which Path.resolve refuses, as it is."""
+    return Path(os.path.realpath(path))
 
 
 def _relation(target: Path, given: Path) -> str:

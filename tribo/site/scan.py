@@ -24,6 +24,7 @@ OVERRIDES = ".overrides.csv"
 _NOT_IN_NAMES = ("\\",)
 _PAGES_OF_THE_SITE = ("index.html", "trend.csv")
 IGNORED = ("Thumbs.db", "desktop.ini", ".DS_Store")
+LEADS_NOWHERE = "this is a link that leads nowhere; put the file or folder itself here"
 _CHUNK = 1 << 20
 _LINK = "a link that leads out of the campaign"  # in place of a hash: nothing behind it is read
 
@@ -113,7 +114,11 @@ def _name_fault(name: str) -> str:
 def _is_campaign(path: Path) -> bool:
     if path.name.startswith("."):
         return False
-    return path.is_dir() or path.suffix.lower() == ".zip" or _uploading(path.name)
+    return path.is_dir() or path.suffix.lower() == ".zip" or _uploading(path.name) or _leads_nowhere(path)
+
+
+def _leads_nowhere(path: Path) -> bool:
+    return path.is_symlink() and not path.exists()
 
 
 def _uploading(name: str) -> bool:
@@ -123,6 +128,8 @@ def _uploading(name: str) -> bool:
 def _look(path: Path, settle_s: float) -> Dropped:
     if leads_out(path.parent, path):
         return Dropped(path.stem if path.suffix.lower() == ".zip" else path.name, path, waiting=(LEADS_OUT,))
+    if _leads_nowhere(path):
+        return Dropped(path.name, path, refused=(LEADS_NOWHERE,))
     if path.is_file():
         name = path.stem if not _uploading(path.name) else path.name
         if too_much := _too_much([path]):
