@@ -243,6 +243,8 @@ def judged(seen: dict[str, Any], expected: dict[str, Any], folder: Path, undistu
     other = differing(seen["state"], expected["state"])
     if status is None:
         return "no end", other
+    if "because of an error in tribo" in words:
+        return "error in tribo", other
     if "Traceback (most recent call last)" in words or re.search(r"Segmentation fault|Aborted|core dumped", words):
         return "traceback or crash", other
     if status == expected["status"]:
@@ -250,6 +252,8 @@ def judged(seen: dict[str, Any], expected: dict[str, Any], folder: Path, undistu
         if worse:
             return "other results", worse
         return ("same numbers" if other else "same bytes"), other
+    if not other:  # all was written, and nobody was left to be told
+        return "same bytes", []
     return "refused" if _sentences(words) else "refused without a word", other
 
 

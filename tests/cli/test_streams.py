@@ -9,8 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from on_the_command_line import run
 from support import first_quick
 from support.sled import SledDesign, SledLaw, write_campaign
+
+from tribo.cli.console import fixed_date
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="devices and shells of Linux")
 TOML = """\
@@ -81,3 +84,21 @@ def test_tests_are_read_where_there_is_no_proc(campaign: Path, tmp_path: Path) -
         pytest.skip("no namespace of mounts")
     assert ended.returncode == 0, ended.stderr
     assert "4 pulls" in ended.stdout
+
+
+@pytest.mark.parametrize("date", ["nonsense", "1e9", "9" * 20])
+def test_a_date_of_the_environment_that_is_none_is_told_before_anything_is_read(
+    campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, date: str
+) -> None:
+    """numpy and matplotlib read SOURCE_DATE_EPOCH, too, and would stop in the middle of an export."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", date)
+    result = run("fit", campaign, "-o", tmp_path / "out", "-q")
+    assert result.exit_code == 1
+    assert f"SOURCE_DATE_EPOCH is no time; found '{date}'" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_empty_date_of_the_environment_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "")
+    assert fixed_date() is None
+    assert "SOURCE_DATE_EPOCH" not in os.environ

@@ -294,9 +294,24 @@ def command_line() -> str:
 
 def now() -> str:
     """The time of this run, or that of SOURCE_DATE_EPOCH (reproducible-builds.org) where it is set."""
+    return (fixed_date() or datetime.now(UTC)).isoformat(timespec="seconds")
+
+
+def fixed_date() -> datetime | None:
+    """The time of SOURCE_DATE_EPOCH, None where it is not set. Raises TriboError where it is no time.
+
+    numpy and other libraries read it, too, and would stop at another place. An empty one, at which they stop as well,
+    is taken away.
+    """
     fixed = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.fromtimestamp(int(fixed), UTC) if fixed else datetime.now(UTC)
-    return now.isoformat(timespec="seconds")
+    if fixed == "":
+        del os.environ["SOURCE_DATE_EPOCH"]
+    try:
+        return datetime.fromtimestamp(int(fixed), UTC) if fixed else None
+    except (ValueError, OverflowError, OSError):
+        what = "the environment variable SOURCE_DATE_EPOCH is no time"
+        allowed = "seconds since 1 January 1970, as a whole number, or nothing"
+        raise TriboError(Problem("environment", what, found=fixed, allowed=allowed)) from None
 
 
 def open_streams() -> None:
@@ -505,6 +520,7 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
         logging.getLogger("tribo").setLevel(logging.DEBUG if debug else logging.NOTSET)
         try:
             with damage_said(lambda text: console.say(text, level=-1)), ended_by_terminate():
+                fixed_date()
                 status = function(console=console, **options)
         except (click.ClickException, BrokenPipeError):
             raise
