@@ -14,6 +14,7 @@ from support.campaigns import DIALECTS as MADE_DIALECTS, MadeCampaign
 
 from tribo.errors import Problem, ReadError
 from tribo.readers import read_export
+from tribo.readers.checks import check_scale
 
 from .tables import Dialect, ramp, written
 
@@ -472,3 +473,12 @@ def test_a_mutated_export_is_read_or_refused(tmp_path: Path, data: st.DataObject
         return
     assert trace.time_s.size == trace.force_N.size > 0
     assert np.isfinite(trace.force_N).all()
+
+
+@pytest.mark.parametrize("least", [5e-324, 1e-320, 1e-300])
+def test_forces_that_are_next_to_nothing_have_no_scale_to_compare_with(least: float) -> None:
+    """Their ratio to others, or that of their changes, has no logarithm."""
+    nothing = np.tile([least, 2 * least], 30)
+    for values in (np.concatenate([nothing, np.ones(60)]), np.concatenate([np.ones(60), nothing])):
+        assert check_scale(values, "a.csv", "force", int) == []
+        assert check_scale(values + np.tile([0.0, 1e-5], 60), "a.csv", "force", int) == []

@@ -270,7 +270,7 @@ def _to_the_end(values: FloatArray, step: FloatArray, large: NDArray[np.int64]) 
         for rows in _LEVEL_ROWS:
             before, after = _typical(values[max(k + 1 - rows, 0) : k + 1]), _typical(values[k + 1 :][:rows])
             ratio = after / before if before else 0.0
-            power = round(math.log10(ratio)) if ratio > 0 else 0
+            power = round(math.log10(ratio)) if 0.0 < ratio < math.inf else 0
             near = 1 <= abs(power) <= 3 and _TEN_TIMES[0] / 10 < ratio / 10.0**power < _TEN_TIMES[1] / 10
             if (
                 near
@@ -321,4 +321,5 @@ def _scaled_as(times: float, before: float, after: float) -> bool:
         return False
     if not after:
         return times < 1
-    return abs(math.log10(after / before / times)) < abs(math.log10(times)) / 2
+    scaled = after / before / times
+    return 0.0 < scaled < math.inf and abs(math.log10(scaled)) < abs(math.log10(times)) / 2
