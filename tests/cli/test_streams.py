@@ -102,3 +102,12 @@ def test_an_empty_date_of_the_environment_is_none(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "")
     assert fixed_date() is None
     assert "SOURCE_DATE_EPOCH" not in os.environ
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_sign_that_a_stream_cannot_show_costs_no_command(encoding: str) -> None:
+    """The minus of typography, say, in the words of a result."""
+    code = "from tribo.cli.console import open_streams; open_streams(); print('−5 %')"
+    env = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+    assert done.stdout == "?5 %\n"

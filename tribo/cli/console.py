@@ -7,6 +7,7 @@ one example in full and the tests they concern. Nothing ends with a traceback.
 from __future__ import annotations
 
 import functools
+import io
 import json
 import logging
 import math
@@ -315,7 +316,8 @@ def fixed_date() -> datetime | None:
 
 
 def open_streams() -> None:
-    """Open what is closed of the three standard streams, so that no file of results gets the number of one of them."""
+    """Open what is closed of the three standard streams, so that no file of results gets the number of one of them; and
+    let a stream show what its encoding has no sign for as "?"."""
     for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         try:
             os.fstat(number)
@@ -323,6 +325,8 @@ def open_streams() -> None:
             os.dup2(os.open(os.devnull, os.O_RDWR), number)
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+        if mode == "w" and isinstance(stream := getattr(sys, name), io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _drop(number: int) -> None:
