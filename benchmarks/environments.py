@@ -298,7 +298,8 @@ class Trials:
                 shutil.rmtree(folder, ignore_errors=True)
         return {
             "number": trial.number, "name": trial.name, "kinds": [s.kind for s in trial.settings], "outcome": outcome,
-            "status": seen["status"], "files": other[:6], "words": seen["words"][-600:],
+            "status": seen["status"], "files": other[:6],
+            "words": seen["words"].replace(str(folder), "FOLDER")[-600:],
         }  # fmt: skip
 
 
