@@ -80,9 +80,7 @@ def with_pulls(bench: Bench, case: Case, design: Mapping[str, Any]) -> Bench:
         turns = [pairs[number % len(pairs)] for number in range(design["pulls"])]
         rows = pd.DataFrame([each[k].iloc[number // len(each) % len(each[k])] for number, (k, _) in enumerate(turns)])
         rows = rows.assign(N=[load for _, load in turns])
-    # a specimen that is mislabelled is so in the rows already: its true sample stands in them
-    effects = [(name, size) for name, size in case.effects if name != "mislabelled_specimen"]
-    return with_further(bench, rows, case.seed, effects, case.design)
+    return with_further(bench, rows, case.seed, list(case.effects), case.design)
 
 
 def how(design: Mapping[str, Any]) -> str:

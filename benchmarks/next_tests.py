@@ -199,9 +199,7 @@ class Laboratory:
 
     def _pulled(self, rows: pd.DataFrame) -> Bench:
         if not self.piece.kind.startswith("laws"):
-            # a specimen that is mislabelled is so in the rows already: its true sample stands in them
-            effects = [(name, size) for name, size in self.case.effects if name != "mislabelled_specimen"]
-            return with_further(self.bench, rows, self.case.seed, effects, self.design)
+            return with_further(self.bench, rows, self.case.seed, list(self.case.effects), self.design)
         made = len(self.bench.tests)
         both = with_further(self.bench, rows, self.case.seed, [], self.design)
         form = hidden_laws.FORMS[self.piece.hidden]

@@ -50,7 +50,8 @@ def with_further(
     ``rows`` are tests of the bench to be made again, as they are or at another load ``N``, speed or hold; where they
     have a column ``without``, the effect that it names does not act. Temperature, humidity and operator are those of
     the later day, or those of the columns ``set_temperature_C`` and so on where there are any. A specimen that the
-    bench does not have is a fresh one. Effects that draw something at random are not allowed.
+    bench does not have is a fresh one. Effects that draw something at random are not allowed; a specimen that is
+    mislabelled is so in the rows already, in which its true sample stands.
     """
     made = len(bench.tests)
     rng = np.random.default_rng([seed, made])
@@ -66,7 +67,7 @@ def with_further(
     rows["operator"] = rng.choice(["op1", "op2"], len(rows))
     for name in ("temperature_C", "humidity_pct", "operator"):
         rows[name] = rows.get(f"set_{name}", rows[name])
-    removed = set(rows.get("without", pd.Series([""])))
+    removed = {*rows.get("without", pd.Series([""])), "mislabelled_specimen"}
     more = Bench(rows, bench.law, bench.errors, bench.measured_shares)
     _apply([(name, size) for name, size in effects if name not in removed], more, rng)
     gains = specimen_gains(more, design, _draws(seed)[4], bench)

@@ -263,7 +263,7 @@ def narrowing_test(cause: CauseCandidate) -> NextTest:
     low, high = float(loads[0]), float(loads[-1])
     places = [(samples, chosen) for samples in (*((name,) for name in every), every)
               for chosen in ((low,), (high,), (low, high), (low / 2, high * 2))]  # fmt: skip
-    samples, chosen = min(places, key=lambda place: width_left(cause, place[0], place[1], PULLS))
+    samples, chosen = min(places, key=lambda place: _size_error(cause, place[0], place[1], PULLS))
     for pulls in range(PULLS, MOST_PULLS + 1, PULLS):
         left = width_left(cause, samples, chosen, pulls)
         if left <= NARROWER:

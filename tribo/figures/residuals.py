@@ -23,6 +23,7 @@ from tribo.figures.misfit import (
     pattern_differences,
 )
 from tribo.records import REGIMES, FloatArray
+from tribo.user_text import plain
 from tribo.vocabulary import described
 
 if TYPE_CHECKING:
@@ -342,8 +343,8 @@ def _thirds(d: Diagnosis) -> dict[str, np.ndarray]:
     low, high = np.nanquantile(x, (1 / 3, 2 / 3))
     ends = x[x <= low].max(), x[x >= high].min()
     return {
-        f"{name} up to {ends[0]:.3g} {words.unit}".rstrip(): x <= low,
-        f"{name} from {ends[1]:.3g} {words.unit}".rstrip(): x >= high,
+        f"{name} up to {plain(ends[0])} {words.unit}".rstrip(): x <= low,
+        f"{name} from {plain(ends[1])} {words.unit}".rstrip(): x >= high,
     }
 
 
