@@ -251,15 +251,6 @@ def table_deviations(table: PublishedTable) -> Deviations:
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class OverLoads:
-    """Measured less modelled T in percent of the model, the least and the most of both ends of the pressures (kPa)."""
-
-    low: float
-    high: float
-    pressures_kPa: tuple[float, float]
-
-
 def verdict_of(results: Sequence[TableReading], gain: Gain) -> Verdict:
     """The verdict on the first reading, which shows all of them."""
     main = results[0]
@@ -287,7 +278,11 @@ def reading_record(o: TableReading) -> dict[str, object]:
 
 
 def misfits(result: TableReading) -> list[Misfit]:
-    """Samples whose friction differs from the model beyond chance, the most certain first."""
+    """Samples whose friction differs from the model beyond chance, the most certain first.
+
+    Each shows measured less modelled T in percent of the model, the least and the most of both ends of the pressures,
+    and these two pressures in kPa.
+    """
     found: list[Misfit] = []
     pressures = result.table.pressures_kPa
     for contrast, p in sorted(result.contrasts.items(), key=lambda item: item[1]):
@@ -297,8 +292,8 @@ def misfits(result: TableReading) -> list[Misfit]:
         low, high = _ratio_percent(result, where, observable)
         sample = "" if where == PATTERNS else where
         column = "normal_load_N" if along_load else "sample"
-        over = OverLoads(low, high, (float(pressures[0]), float(pressures[-1])))
-        found.append(Misfit(observable, sample, column, (low + high) / 2, p, shows=over))
+        over_loads = (low, high), (float(pressures[0]), float(pressures[-1]))
+        found.append(Misfit(observable, sample, column, (low + high) / 2, p, shows=over_loads))
     once = {(m.sample, m.observable): m for m in reversed(found)}
     return [m for m in found if once[m.sample, m.observable] is m]
 

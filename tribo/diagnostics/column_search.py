@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from scipy.stats import f as f_distribution, t as t_distribution
 
 from tribo.diagnostics.contrasts import share_beyond
 from tribo.diagnostics.gaps import enough_recorded
-from tribo.diagnostics.verdict import RepeatScatter
+from tribo.diagnostics.verdict import TooLittle
 from tribo.fitting.alternatives import is_one_level
 from tribo.mechanisms.conditions import is_level
 from tribo.mechanisms.record import StringArray
@@ -496,8 +496,8 @@ def _ends(column: Regressor, size: FloatArray) -> tuple[FloatArray, FloatArray, 
     return levels[first], levels[last], (column.levels[first], column.levels[last])
 
 
-def most_scattered(ingested: Ingested) -> RepeatScatter | None:
-    """The repeats that scatter most: tests of one sample at one load and equal settings; None where there are none.
+def with_repeats(lack: TooLittle, ingested: Ingested) -> TooLittle:
+    """The same with the repeats that scatter most: tests of one sample at one load and equal settings.
 
     Settings are speed, hold, stiffness, and further columns in which several tests share each of the values.
     """
@@ -520,5 +520,5 @@ def most_scattered(ingested: Ingested) -> RepeatScatter | None:
                 forces = forces[forces > 0]
                 if forces.size > 1:
                     factor = float(forces.max() / forces.min())
-                    found.append(RepeatScatter(sample, regime, load, forces.size, factor))
-    return max(found, key=lambda scatter: scatter.factor, default=None)
+                    found.append(replace(lack, repeated=(regime, sample, load), repeats=forces.size, factor=factor))
+    return max(found, key=lambda repeated: repeated.factor, default=lack)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from tribo.diagnostics.candidates import CauseCandidate, Named, judged, refitted, weights_of
-from tribo.diagnostics.column_search import most_scattered
+from tribo.diagnostics.column_search import with_repeats
 from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.direct_evidence import Evidence, stated_evidence
-from tribo.diagnostics.effect_sizes import effect_of_contrast, percent
+from tribo.diagnostics.effect_sizes import misfit_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
 from tribo.diagnostics.inference import (
     estimates,
@@ -68,17 +68,7 @@ def misfits_of(
         contrast = screened.contrasts[k]
         if contrast.kind != "mechanism" and not contrast.is_taken_up(flat):
             shown.setdefault((contrast.column, contrast.sample), k)
-    return [_misfit(screened, k, log_ratio, conditions) for k in [*shown.values()][:SHOWN] or beyond[:1]]
-
-
-def _misfit(screened: Screen, k: int, log_ratio: FloatArray, conditions: Conditions) -> Misfit:
-    """What one contrast of a screen sees in a residual, as a misfit."""
-    contrast, size, strength = screened.contrasts[k], float(screened.size[k]), float(screened.strength[k])
-    effect = effect_of_contrast(contrast, log_ratio, conditions, screened.coefficients[k], size, strength)
-    return Misfit(
-        contrast.observable, contrast.sample, contrast.column, effect.percent, float(screened.p[k]), low=effect.low,
-        high=effect.high, shows=effect,
-    )  # fmt: skip
+    return [misfit_of_contrast(screened, k, log_ratio, conditions) for k in [*shown.values()][:SHOWN] or beyond[:1]]
 
 
 def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
@@ -291,7 +281,7 @@ def conclude(
     patterns = pattern_corrections(model)
     layers = patterns
     if named is not None:
-        remain = [_misfit(alone, 0, model.residual, o.conditions) for alone in named.remainders]
+        remain = [misfit_of_contrast(alone, 0, model.residual, o.conditions) for alone in named.remainders]
         left = remain + misfits_of(named.left, level, model.residual, o.conditions, o.flat)
         misfits = [*left, *misfits] if named.causes and not patterns_apart(misfits) else [*misfits, *left]
         layers = [*patterns, *cause_layers(named, shown, screened, baseline, rng), *remainder_layers(remain)]
@@ -326,7 +316,7 @@ def cannot_tell(ingested: Ingested) -> Verdict | None:
     lack = too_little(observe(ingested))
     if lack is None:
         return None
-    lack = replace(lack, scatter=most_scattered(ingested))
+    lack = with_repeats(lack, ingested)
     return Verdict("cannot_tell", set_aside=ingested.set_aside, next_test=more_tests(lack), shows=lack)
 
 

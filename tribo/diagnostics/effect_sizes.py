@@ -5,13 +5,13 @@ A change is that of measured / model from one end of a column to the other, as a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from tribo.diagnostics.contrasts import BEND, Contrast
-from tribo.display import displayed
+from tribo.diagnostics.contrasts import BEND, Contrast, Screen
+from tribo.diagnostics.verdict import Misfit
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
@@ -68,36 +68,14 @@ Between = Literal["mean", "bend", "ends", "groups", "extremes"]
 Run = Literal["rising", "falling", "hump", "hollow"]
 
 
-@displayed()
-@dataclass(frozen=True)
-class Effect:
-    """A signed percentage with its 90 % interval, between what it is taken, and the contrast that sees it.
+def misfit_of_contrast(screened: Screen, k: int, log_ratio: FloatArray, conditions: Conditions) -> Misfit:
+    """What one contrast of a screen sees in ``log_ratio`` (n, 2), the ln(measured / model) of every test, as a misfit.
 
-    ``course`` is the run of the means of groups, of a contrast at several of them.
+    Where no straight line gives its size, that is the peak-to-peak effect of the screen: with the sign of the largest
+    change of a mechanism, without one of several columns. The misfit shows the contrast, between what its size is
+    taken, and the run of the means of groups, of a contrast at several of them.
     """
-
-    percent: float
-    low: float
-    high: float
-    between: Between
-    contrast: Contrast
-    course: Run
-
-
-def effect_of_contrast(
-    contrast: Contrast,
-    log_ratio: FloatArray,
-    conditions: Conditions,
-    coefficients: FloatArray,
-    size: float,
-    strength: float,
-) -> Effect:
-    """The size of a contrast in ``log_ratio`` (n, 2), the ln(measured / model) of every test under its conditions.
-
-    ``size`` is its peak-to-peak effect in ln T, stated where no straight line gives it.
-
-    That of a mechanism has the sign of its largest change; that of several columns has none.
-    """
+    contrast, coefficients, size = screened.contrasts[k], screened.coefficients[k], float(screened.size[k])
     value, between = _signed(contrast, log_ratio, conditions)
     if not np.isfinite(value):
         change = (contrast.columns @ coefficients).ravel()
@@ -108,8 +86,11 @@ def effect_of_contrast(
     course: Run = "hump" if middle > 0.5 * coefficients[-1] else "hollow"
     if np.all(steps > 0) or np.all(steps < 0):
         course = "rising" if np.all(steps > 0) else "falling"
-    ends = interval_percent(value, strength)
-    return Effect(value, *ends, between, replace(contrast, courses=()), course)
+    low, high = interval_percent(value, float(screened.strength[k]))
+    return Misfit(
+        contrast.observable, contrast.sample, contrast.column, value, float(screened.p[k]), low=low, high=high,
+        shows=(replace(contrast, courses=()), between, course),
+    )  # fmt: skip
 
 
 def _signed(contrast: Contrast, log_ratio: FloatArray, conditions: Conditions) -> tuple[float, Between]:

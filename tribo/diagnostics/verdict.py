@@ -187,22 +187,11 @@ class AgainstModel:
 
 @displayed()
 @dataclass(frozen=True)
-class RepeatScatter:
-    """Repeats of one sample at one load (N): the largest force over the smallest of ``n`` tests."""
-
-    sample: str
-    regime: str
-    normal_load_N: float
-    n: int
-    factor: float
-
-
-@displayed()
-@dataclass(frozen=True)
 class TooLittle:
     """Why a campaign cannot be tested: the usable tests, their loads and samples, with the fewest that are needed.
 
-    ``scatter`` is that of the repeats that scatter most, None where nothing was repeated.
+    Of the repeats that scatter most, ``repeated`` says the regime, the sample and the load (N), ``repeats`` their
+    number and ``factor`` the largest force over the smallest; nothing where nothing was repeated.
     """
 
     tests: int
@@ -211,7 +200,9 @@ class TooLittle:
     fewest_tests: int
     fewest_loads: int
     fewest_samples: int
-    scatter: RepeatScatter | None = None
+    repeated: tuple[str, str, float] | None = None
+    repeats: int = 0
+    factor: float = math.nan
 
 
 @displayed()

@@ -16,9 +16,9 @@ from tribo.diagnostics.column_search import (
     ColumnEffect,
     RegimeTests,
     load_levels,
-    most_scattered,
     regime_tests,
     search_columns,
+    with_repeats,
 )
 from tribo.diagnostics.direct_evidence import RunningIn, running_in, stroke_offset
 from tribo.diagnostics.planning import more_tests
@@ -159,7 +159,8 @@ def _tested(study: Study, tests: list[RegimeTests], enough: list[RegimeTests]) -
     n, loads, samples = max(
         ((t.n, len(np.unique(load_levels(t.load_N))), len(np.unique(t.sample))) for t in tests), default=(0, 0, 0)
     )
-    return ColumnsTested((), TooLittle(n, loads, samples, needed, 1, 1, most_scattered(study.ingested)), (), copied)
+    lack = with_repeats(TooLittle(n, loads, samples, needed, 1, 1), study.ingested)
+    return ColumnsTested((), lack, (), copied)
 
 
 def copied_readings(ingested: Ingested) -> tuple[tuple[str, ...], ...]:

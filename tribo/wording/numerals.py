@@ -56,7 +56,7 @@ def percent(fraction: float) -> str:
     return true_minus(f"{value:.1f} %" if abs(value) < 2.95 else f"{value:.0f} %")
 
 
-def joined(words: list[str]) -> str:
+def joined(words: Sequence[str]) -> str:
     """ "A, B and C"."""
     return ", ".join(words[:-1]) + " and " + words[-1] if len(words) > 1 else "".join(words)
 

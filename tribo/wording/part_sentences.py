@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tribo.berardo2019.table_diagnosis import OverLoads
 from tribo.diagnostics.column_search import ColumnEffect
+from tribo.diagnostics.contrasts import Contrast
 from tribo.diagnostics.direct_evidence import OFFSET, Evidence, RunningIn
-from tribo.diagnostics.effect_sizes import Effect
+from tribo.diagnostics.effect_sizes import Run
 from tribo.diagnostics.verdict import UNTESTED, Cause, Estimate, Excluded, Layer, Misfit, NextTest
 from tribo.diagnostics.without_model import SERIES
 from tribo.lawsearch.grammar import WrittenLaw
@@ -109,19 +109,13 @@ def not_varied(columns: Sequence[str]) -> str:
 def misfit_sentence(m: Misfit) -> str:
     """What follows what, by how much and how surely."""
     shows = m.shows
-    if isinstance(shows, Effect):
-        of = f" of {m.sample}" if m.sample and shows.contrast.kind != "specimen" else ""
+    if isinstance(shows, tuple) and isinstance(shows[0], Contrast):
+        contrast, between, course = shows
+        of = f" of {m.sample}" if m.sample and contrast.kind != "specimen" else ""
         interval = f"90 % interval {signed(m.low)} to {signed(m.high)} %"
-        size = f"{signed(m.effect_percent)} % ({interval}), {BETWEEN[shows.between]}"
-        what = f"{sentence_case(OBSERVABLES[m.observable])}{of} {_seen(shows)}"
+        size = f"{signed(m.effect_percent)} % ({interval}), {BETWEEN[between]}"
+        what = f"{sentence_case(OBSERVABLES[m.observable])}{of} {_seen(contrast, m.effect_percent > 0, course)}"
         return f"{what}: {size} (adjusted p {p_text(m.p_adjusted)})."
-    if isinstance(shows, OverLoads):
-        whose = m.sample or "the patterned samples together"
-        first, last = shows.pressures_kPa
-        return (
-            f"{sentence_case(OBSERVABLES[m.observable])} of {whose} is {_off(shows)} of the calibrated model at "
-            f"{first:g} to {last:g} kPa (adjusted p {p_text(m.p_adjusted)})."
-        )
     if isinstance(shows, Layer):
         return layer_sentence(shows)
     if isinstance(shows, Cause):
@@ -131,9 +125,8 @@ def misfit_sentence(m: Misfit) -> str:
     return without_model_sentence(shows) if shows else m.text
 
 
-def _seen(e: Effect) -> str:
+def _seen(contrast: Contrast, up: bool, course: Run) -> str:
     """What the observable does relative to the model."""
-    contrast, up = e.contrast, e.percent > 0
     goes, lies, words = "rises" if up else "falls", "is higher" if up else "is lower", in_words(contrast.covariate)
     if contrast.acting is not None:
         return f"varies as expected from {with_choice(contrast.acting.name, contrast.acting.choice)}"
@@ -151,15 +144,7 @@ def _seen(e: Effect) -> str:
         return f"varies periodically with {words}" + (f" ({contrast.detail} pulls)" if contrast.detail else "")
     if contrast.kind == "block":
         return f"{lies} for {words} {contrast.detail} than in the rest of the series"
-    return f"differs between values of {words}" if contrast.kind == "level" else f"follows {words}, {COURSES[e.course]}"
-
-
-def _off(o: OverLoads) -> str:
-    if o.high < 0:
-        return f"{-o.high:.0f} to {-o.low:.0f} % below that"
-    if o.low > 0:
-        return f"{o.low:.0f} to {o.high:.0f} % above that"
-    return f"from {-o.low:.0f} % below to {o.high:.0f} % above that"
+    return f"differs between values of {words}" if contrast.kind == "level" else f"follows {words}, {COURSES[course]}"
 
 
 def cause_sentence(c: Cause) -> str:

@@ -9,10 +9,10 @@ import numpy as np
 
 from tribo.berardo2019.table_diagnosis import LEVEL, TableContrast, TableReading
 from tribo.berardo2019.table_model import TableFit, estimate_of, upper_limit
-from tribo.diagnostics.verdict import Gain, Verdict
+from tribo.diagnostics.verdict import Gain, Misfit, Verdict
 from tribo.mechanisms import MECHANISMS
 from tribo.vocabulary import OBSERVABLES
-from tribo.wording.numerals import p_text
+from tribo.wording.numerals import p_text, sentence_case
 
 LEAST_ALIKE = 0.6  # correlations above this (less negative) no line over the range of the paper can have
 
@@ -27,6 +27,21 @@ def published_evidence(v: Verdict) -> str:
     """What the numbers say of the explanations of the authors, and of the best extension."""
     outlooks, gain = v.shows
     return " ".join([*_guesses(outlooks), _extension(outlooks[0], outlooks[0].weighed[0], gain)])
+
+
+def table_misfit_sentence(m: Misfit) -> str:
+    """Whose friction differs from the calibrated model, by how much over the loads of the table and how surely."""
+    (low, high), (first_kPa, last_kPa) = m.shows
+    whose = m.sample or "the patterned samples together"
+    off = f"from {-low:.0f} % below to {high:.0f} % above that"
+    if high < 0:
+        off = f"{-high:.0f} to {-low:.0f} % below that"
+    elif low > 0:
+        off = f"{low:.0f} to {high:.0f} % above that"
+    return (
+        f"{sentence_case(OBSERVABLES[m.observable])} of {whose} is {off} of the calibrated model at {first_kPa:g} to "
+        f"{last_kPa:g} kPa (adjusted p {p_text(m.p_adjusted)})."
+    )
 
 
 def _contrast(contrast: TableContrast | str) -> str:

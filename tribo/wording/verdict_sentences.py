@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+from tribo.diagnostics.conclusion import patterns_apart
 from tribo.diagnostics.inference import WITHIN
 from tribo.diagnostics.score_statistics import RecordedInPart
 from tribo.diagnostics.verdict import (
@@ -22,7 +23,6 @@ from tribo.diagnostics.verdict import (
     Layer,
     LayerKind,
     Misfit,
-    RepeatScatter,
     TooLittle,
     Verdict,
 )
@@ -53,7 +53,7 @@ from tribo.wording.part_sentences import (
     reason,
     why_not,
 )
-from tribo.wording.table_sentences import published_evidence, published_sentence
+from tribo.wording.table_sentences import published_evidence, published_sentence, table_misfit_sentence
 
 MOST_LAWS, IN_FULL = 4, 2  # laws of samples that a finding holds at all, and each in a sentence of its own
 MOST_TESTED = 12
@@ -89,16 +89,17 @@ def worded(v: Verdict) -> Verdict:
     excluded, not_testable = (
         tuple(replace(e, reason=reason(e, of_a_table)) for e in part) for part in (v.excluded, v.not_testable)
     )
+    misfit = table_misfit_sentence if of_a_table else misfit_sentence
     v = replace(
         v,
-        misfits=tuple(replace(m, text=misfit_sentence(m)) for m in v.misfits),
+        misfits=tuple(replace(m, text=misfit(m)) for m in v.misfits),
         causes=tuple(replace(c, text=cause_sentence(c)) for c in v.causes),
         excluded=excluded,
         not_testable=not_testable,
         layers=tuple(replace(layer, text=layer_sentence(layer), at=place(layer)) for layer in v.layers),
         next_test=replace(v.next_test, text=next_test_sentence(v.next_test)) if v.next_test is not None else None,
     )
-    if isinstance(v.shows, tuple):
+    if of_a_table:
         v = replace(v, sentence=published_sentence(v), evidence=published_evidence(v))
         return replace(v, text=f"{v.sentence} {v.evidence}")
     if isinstance(v.shows, ColumnsTested):
@@ -106,7 +107,7 @@ def worded(v: Verdict) -> Verdict:
     if isinstance(v.shows, TooLittle):
         v = replace(
             v, sentence=f"Cannot tell whether friction differs from the model: {lacking(v.shows)}.",
-            evidence=scatter_in_words(v.shows.scatter),
+            evidence=scatter_in_words(v.shows),
         )  # fmt: skip
         return replace(v, text=f"{v.sentence} {v.evidence}".strip())
     v = replace(v, shows=v.shows or AgainstModel())
@@ -289,7 +290,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
         yield f"With {these} included, the remaining differences are within chance{_and_error(v)}."
     elif v.verdict == "partly" and not laws:
         yield f"A misfit remains beyond chance: {v.misfits[0].text if v.misfits else 'no single column explains it.'}"
-    elif v.verdict == "unknown" and (apart := _patterns_apart(v)):
+    elif v.verdict == "unknown" and (apart := patterns_apart(v.misfits)):
         yield (
             f"{joined(apart)} differ from the model independently of each other, and no recorded column explains the "
             "differences."
@@ -332,13 +333,6 @@ def _and_error(v: Verdict) -> str:
     return " and the error that the model has for the patterns" if patterned else ""
 
 
-def _patterns_apart(v: Verdict) -> list[str]:
-    """The samples that each have a misfit of their own, where there are three or more and no other column has one."""
-    samples = list(dict.fromkeys(m.sample for m in v.misfits if m.sample))
-    alone = all(m.covariate in ("sample", "normal_load_N") for m in v.misfits)
-    return samples if alone and len(samples) >= 3 else []
-
-
 def _simulation(model: Any) -> Iterator[str]:
     """Where the predictions come from, and what the named mechanisms give in the simulator itself."""
     if "shares_from" in model:
@@ -373,17 +367,18 @@ def lacking(lack: TooLittle) -> str:
     return f"too little was measured ({'; '.join(short)})"
 
 
-def scatter_in_words(scatter: RepeatScatter | None) -> str:
+def scatter_in_words(lack: TooLittle) -> str:
     """How far the repeats that scatter most are apart, in one sentence; empty where nothing was repeated."""
-    if scatter is None:
+    if lack.repeated is None:
         return ""
-    if scatter.factor >= FACTOR:
-        apart = f"scatters by a factor of {scatter.factor:.2f} (the largest over the smallest)"
+    regime, sample, load_N = lack.repeated
+    if lack.factor >= FACTOR:
+        apart = f"scatters by a factor of {lack.factor:.2f} (the largest over the smallest)"
     else:
-        apart = f"scatters by {significant(100 * (scatter.factor - 1), 2)} %"
+        apart = f"scatters by {significant(100 * (lack.factor - 1), 2)} %"
     return (
-        f"{sentence_case(scatter.regime)} friction of {scatter.sample} at {significant(scatter.normal_load_N)} N, "
-        f"measured {scatter.n} times, {apart}."
+        f"{sentence_case(regime)} friction of {sample} at {significant(load_N)} N, measured {lack.repeats} times, "
+        f"{apart}."
     )
 
 
@@ -413,7 +408,7 @@ def _without_model(v: Verdict) -> Verdict:
     more = [f"The laws of {len(laws) - MOST_LAWS} more are listed below."] if len(laws) > MOST_LAWS else []
     evidence = []
     if shows.lack is not None:
-        evidence = list(filter(None, [scatter_in_words(shows.lack.scatter)]))
+        evidence = list(filter(None, [scatter_in_words(shows.lack)]))
     elif not v.causes:
         tested = sorted(map(in_words, shows.columns))
         if len(tested) > MOST_TESTED:
