@@ -23,7 +23,7 @@ from tribo.errors import FitError, Problem
 from tribo.fitting.budget import degrees_of_freedom
 from tribo.fitting.linear import WEIGHTS, LinearFit, Rows, least_squares, sample_rows, weights_of
 from tribo.fitting.samples import ONE_SPECIMEN, combine, fit_samples
-from tribo.laws import BERARDO, LAWS, Law, Parameter, Variable, design_over_load
+from tribo.laws import BERARDO, LAWS, Law, Parameter, design_over_load
 from tribo.records import FloatArray, LawFit, Regime
 
 
@@ -71,9 +71,7 @@ def pressure_power_adhesion_gradient(
     return by_mu, by_n, nominal_area_m2
 
 
-CONDITIONS = (
-    Variable("normal_load_N", "N"), Variable("nominal_area_m2", "m^2"), Variable("reference_pressure_Pa", "Pa"),
-)  # fmt: skip
+CONDITIONS = ("normal_load_N", "nominal_area_m2", "reference_pressure_Pa")
 MU_REF = Parameter("mu_ref", "μ_ref", "", "T/N at the reference pressure", low=0.0)
 EXPONENT = Parameter("n", "n", "", "exponent by which T/N falls with pressure", low=-1.0, high=1.0)
 TAU0 = LAWS["coulomb_adhesion"].parameters[1]

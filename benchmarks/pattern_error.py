@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tribo.diagnostics.predictor import TabledPattern, interpolated_shares
+from tribo.diagnostics.predictor import Known, interpolated_shares
 from tribo.records import REGIMES, FloatArray
 from tribo.springblock.calibration import simulated_law
 from tribo.springblock.config import PAPER_PRESSURES_PA
@@ -98,16 +98,16 @@ def of_form(runs: pd.DataFrame) -> Iterator[Case]:
             yield _case("form of the law", regime, "runs over law", str(sample), parts)
 
 
-def of_interpolation(patterns: tuple[TabledPattern, ...], flat: FloatArray) -> Iterator[Case]:
+def of_interpolation(patterns: Mapping[str, Known], flat: FloatArray) -> Iterator[Case]:
     """Every pattern of the table predicted from the others; both directions of one pattern are left out together."""
-    for left_out in patterns:
-        known = [k for k in patterns if k.pattern.name != left_out.pattern.name]
-        shares = np.array(interpolated_shares(left_out.pattern.area_fraction, known))
-        own = np.array(left_out.shares)
+    for sample, (left_out, own_shares) in patterns.items():
+        known = [(pattern, shares) for pattern, shares in patterns.values() if pattern.name != left_out.name]
+        shares = np.array(interpolated_shares(left_out.area_fraction, known))
+        own = np.array(own_shares)
         for k, regime in enumerate(REGIMES):
             at = slice(2 * k, 2 * k + 2)
             parts = split(change_of_force(shares[at], own[at], flat[at] * (1.0, 1e3)))
-            yield _case("interpolation", regime, "left out", left_out.sample, parts)
+            yield _case("interpolation", regime, "left out", sample, parts)
 
 
 def sizes(cases: Iterable[Case]) -> pd.DataFrame:

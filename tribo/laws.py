@@ -15,15 +15,6 @@ from tribo.records import FloatArray
 
 @displayed()
 @dataclass(frozen=True)
-class Variable:
-    """A condition under which a law is evaluated: its argument name and SI unit ("" where dimensionless)."""
-
-    name: str
-    unit: str
-
-
-@displayed()
-@dataclass(frozen=True)
 class Parameter:
     """A parameter of a law. ``low`` and ``high`` are the physical limits, not bounds of a fit."""
 
@@ -40,6 +31,7 @@ class Parameter:
 class Law:
     """One friction law T(conditions; parameters), T in newton.
 
+    ``conditions`` are the names of the arguments under which it is evaluated, which end in their SI units.
     ``function(*conditions, *parameters)`` returns T; ``gradient`` takes the same arguments and returns
     dT/dparameter, one array per parameter in their order. Both are pure and broadcast. ``linear`` says that
     T is linear in all parameters, so that the gradient is the design matrix of a least-squares fit.
@@ -49,7 +41,7 @@ class Law:
     formula: str
     function: Callable[..., Any]
     gradient: Callable[..., tuple[Any, ...]]
-    conditions: tuple[Variable, ...]
+    conditions: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     linear: bool
     source: str
@@ -129,9 +121,7 @@ def three_term_gradient(
     return normal_load_N, area_fraction * nominal_area_m2, nominal_area_m2
 
 
-_LOAD = Variable("normal_load_N", "N")
-_AREA = Variable("nominal_area_m2", "m^2")
-_AREA_FRACTION = Variable("area_fraction", "")
+_LOAD, _AREA, _AREA_FRACTION = "normal_load_N", "nominal_area_m2", "area_fraction"
 _MU = Parameter("mu", "μ", "", "friction coefficient: slope of T against N", low=0.0)
 _TAU0 = Parameter("tau0_Pa", "τ₀", "Pa", "adhesion per nominal area: T/A at no load, of either sign")
 

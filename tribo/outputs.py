@@ -24,12 +24,15 @@ FLOAT_FORMAT = "%.8g"
 # How the end of a column name says its unit; the longest ending wins.
 UNIT_ENDINGS = {
     "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_mm_s": "mm/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
-    "_N": "N",
-    "_N_per_decade": "N", "_per_m": "1/m", "_J": "J",
+    "_N": "N", "_m2": "m2", "_N_m": "N/m", "_N_s_per_m": "N s/m", "_Pa_per_m": "Pa/m", "_kg_m3": "kg/m3",
+    "_per_s": "1/s", "_N_per_decade": "N", "_per_m": "1/m", "_J": "J",
     "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_um": "um", "_Hz": "Hz",
     "_pct": "percent", "_percent": "percent",
 }  # fmt: skip
-UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
+UNITLESS = {
+    "mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa", "mu_s": "1",
+    "friction_mu_s": "1",
+}  # fmt: skip
 
 
 def unit_of(column: str) -> str | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,9 +84,9 @@ def test_a_reading_that_breaks_the_balance_of_normal_forces_is_left_out() -> Non
 def test_no_direction_of_a_pattern_helps_to_interpolate_the_other() -> None:
     """S along x is predicted from A, B, C and the flat sample: that Sy is twice as large changes nothing."""
     table = simulated_patterns()
-    doubled = tuple(
-        replace(row, shares=tuple(2 * v for v in row.shares)) if row.sample == "Sy" else row for row in table
-    )
+    pattern, shares = table["Sy"]
+    static_mu, static_tau0, sliding_mu, sliding_tau0 = (2 * v for v in shares)
+    doubled = {**table, "Sy": (pattern, (static_mu, static_tau0, sliding_mu, sliding_tau0))}
     flat = np.array([5.0, 20.0, 3.0, 11.0])
     before, after = ({c["sample"]: c["offset"] for c in e.of_interpolation(t, flat)} for t in (table, doubled))
     assert before["Sx"] == after["Sx"]
@@ -97,10 +96,10 @@ def test_no_direction_of_a_pattern_helps_to_interpolate_the_other() -> None:
 
 def test_a_pattern_like_one_of_the_table_but_for_its_name_is_interpolated_to_it() -> None:
     """At the area fraction of B the interpolation is B."""
-    b = next(row for row in simulated_patterns() if row.sample == "B")
+    b, shares = simulated_patterns()["B"]
     plain = Pattern("new", "circle", (20e-6, 20e-6), (30e-6, 30e-6))
-    assert plain.area_fraction == pytest.approx(b.pattern.area_fraction)
-    assert e.interpolated_shares(plain.area_fraction, simulated_patterns()) == pytest.approx(b.shares)
+    assert plain.area_fraction == pytest.approx(b.area_fraction)
+    assert e.interpolated_shares(plain.area_fraction, simulated_patterns().values()) == pytest.approx(shares)
 
 
 def test_the_bundled_sizes_are_made_again_from_their_sources_to_the_printed_digits() -> None:

@@ -11,7 +11,7 @@ from other_fits import POWER_LAWS, fit_curve
 
 from tribo.errors import FitError
 from tribo.fitting.linear import LinearFit, least_squares
-from tribo.laws import Law, Parameter, Variable
+from tribo.laws import Law, Parameter
 
 LINEAR_DIGITS = 10
 NONLINEAR_DIGITS = 8
@@ -70,7 +70,7 @@ def saturating_gradient(x: Any, b1: Any, b2: Any) -> tuple[Any, Any]:
 @pytest.mark.parametrize("start", [(500.0, 0.0001), (250.0, 0.0005)], ids=["far", "near"])
 def test_a_law_outside_the_table_solves_misra1a_from_both_official_starts(start: tuple[float, float]) -> None:
     law = Law(
-        "misra1a", "y = b1 (1 - exp(-b2 x))", saturating, saturating_gradient, (Variable("x", ""),),
+        "misra1a", "y = b1 (1 - exp(-b2 x))", saturating, saturating_gradient, ("x",),
         (Parameter("b1", "b1", "", ""), Parameter("b2", "b2", "", "")), False, "NIST StRD",
     )  # fmt: skip
     fit = fit_curve(law, (MISRA1A.x,), MISRA1A.y, np.array(start))

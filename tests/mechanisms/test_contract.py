@@ -142,7 +142,7 @@ def test_a_choice_concerns_some_test_and_is_called_by_the_name_of_the_mechanism(
     choice = first_choice(m, base(c), c)
     acting = [m.on_test(m.start(), choice, c, test) for test in range(48)]
     assert any(here is not None for here in acting)
-    assert all(here is None or len(here.values) == len(m.parameters) for here in acting)
+    assert all(here is None or len(here[0]) == len(m.parameters) for here in acting)
     assert m.called(choice).split(":")[0] == m.name
     assert m.choosing.held_out in ("samples", "loads")
 
@@ -166,11 +166,12 @@ def test_on_one_test_it_changes_the_force_as_its_law_does_over_the_campaign(m: M
         one = replace(c, **{name: getattr(c, name)[[test]] for name in arrays}, columns={"column": np.array(["this"])})
         alone = np.array([[v[test] for v in (b.static_mu, b.static_adhesion_N, b.sliding_mu, b.sliding_adhesion_N)]])
         single = Base(*alone.T, by_sample=LAWS, flat="F")
-        if here.other_sample:
-            other = single.as_sample(here.other_sample).forces(one.normal_load_N)
+        values, other_sample = here
+        if other_sample:
+            other = single.as_sample(other_sample).forces(one.normal_load_N)
             assert whole[test] == pytest.approx(other.static_N[0])
         else:
-            after = m.law(here.values, single, one, m.choosing.in_one_run(one))
+            after = m.law(values, single, one, m.choosing.in_one_run(one))
             assert whole[test] == pytest.approx(after.static_N[0])
 
 

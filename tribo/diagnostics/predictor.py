@@ -9,7 +9,7 @@ says what the numbers mean.
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
@@ -31,15 +31,8 @@ LAW, SHARES = ("mu", "tau0_kPa"), ("mu_share", "tau0_share")  # columns
 UM = 1e-6
 
 
-@dataclass(frozen=True)
-class TabledPattern:
-    """One simulated pattern. ``direction`` is "x" or "y" where the pull has one, else empty."""
-
-    sample: str
-    pattern: Pattern
-    direction: str
-    law: Law
-    shares: Law
+Known = tuple[Pattern, Law]
+"""A simulated pattern, and its shares."""
 
 
 @displayed()
@@ -73,10 +66,10 @@ NO_ERROR = ErrorSize((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 
 
 @cache
-def simulated_patterns() -> tuple[TabledPattern, ...]:
-    """The patterns of ``laws.csv``, without the flat sample."""
+def simulated_patterns() -> Mapping[str, Known]:
+    """The patterns of ``laws.csv`` by sample, without the flat one; a sample whose pull has a direction ends in it."""
     rows = _rows("laws.csv")
-    patterns = []
+    patterns = {}
     for sample in dict.fromkeys(row["sample"] for row in rows if row["cavity"] != "none"):
         own = [row for row in rows if row["sample"] == sample]
         row = own[0]
@@ -85,8 +78,8 @@ def simulated_patterns() -> tuple[TabledPattern, ...]:
         )
         name = sample.removesuffix(row["direction"])
         pattern = Pattern(name, row["cavity"], (size_x, size_y), (pitch_x, pitch_y), row["staggered"] == "1")
-        patterns.append(TabledPattern(sample, pattern, row["direction"], _four(own, LAW), _four(own, SHARES)))
-    return tuple(patterns)
+        patterns[sample] = pattern, _four(own, SHARES)
+    return MappingProxyType(patterns)
 
 
 @cache
@@ -209,7 +202,7 @@ def _with_error(
     for name, pattern in patterns.items():
         if pattern.area_fraction == 1.0:
             error[name] = NO_ERROR
-        elif name in simulated or _simulated_as(name, pattern) is not None:
+        elif name in simulated or _simulated_shares(name, pattern) is not None:
             error[name] = known["total"]
         else:
             error[name] = known["total"].with_(known["interpolation"])
@@ -219,32 +212,34 @@ def _with_error(
 def _shares(name: str, pattern: Pattern) -> Law:
     if pattern.area_fraction == 1.0:
         return (1.0, 1.0, 1.0, 1.0)
-    same = _simulated_as(name, pattern)
-    return interpolated_shares(pattern.area_fraction, simulated_patterns()) if same is None else same.shares
+    same = _simulated_shares(name, pattern)
+    return interpolated_shares(pattern.area_fraction, simulated_patterns().values()) if same is None else same
 
 
-def interpolated_shares(area_fraction: float, known: Sequence[TabledPattern]) -> Law:
+def interpolated_shares(area_fraction: float, known: Collection[Known]) -> Law:
     """Shares of a pattern that was not simulated, between those of the known ones and of the flat sample.
 
     By area fraction, in which mu's share and tau0's share per contact area are piecewise linear. Patterns of equal area
     fraction are averaged; below the smallest one both are held.
     """
-    at = np.array([k.pattern.area_fraction for k in known])
+    at = np.array([pattern.area_fraction for pattern, _ in known])
     levels = np.unique(at.round(9))
-    per_area = np.array([k.shares for k in known]) / np.array([np.ones_like(at), at, np.ones_like(at), at]).T
+    per_area = np.array([shares for _, shares in known]) / np.array([np.ones_like(at), at, np.ones_like(at), at]).T
     rows = [per_area[np.isclose(at, level)].mean(axis=0) for level in levels]
     x, y = np.append(levels, 1.0), np.array([*rows, np.ones(4)])
     m_static, a_static, m_sliding, a_sliding = (float(np.interp(area_fraction, x, column)) for column in y.T)
     return m_static, a_static * area_fraction, m_sliding, a_sliding * area_fraction
 
 
-def _simulated_as(name: str, pattern: Pattern) -> TabledPattern | None:
-    """The simulated pattern with this cavity and pitch, pulled along the direction that ends the sample's name."""
+def _simulated_shares(name: str, pattern: Pattern) -> Law | None:
+    """Those of the simulated pattern with this cavity and pitch, pulled along the direction that ends the sample's
+    name."""
     wanted = _lengths_m(pattern)
-    for row in simulated_patterns() if wanted else ():
-        same = np.allclose(_lengths_m(row.pattern), wanted, rtol=ALIKE, atol=0.0)
-        if same and row.direction in ("", name[-1:].lower()):
-            return row
+    for sample, (simulated, shares) in simulated_patterns().items() if wanted else ():
+        direction = sample.removeprefix(simulated.name)
+        same = np.allclose(_lengths_m(simulated), wanted, rtol=ALIKE, atol=0.0)
+        if same and direction in ("", name[-1:].lower()):
+            return shares
     return None
 
 

@@ -142,8 +142,8 @@ def _pair(model: ModelFit, test: int, seed: int) -> tuple[SimConfig, dict[str, V
     for acting, values in zip(model.acting, model.values, strict=True):
         here = acting.mechanism.on_test(values, acting.choice, c, test)
         if here is not None:  # the choice concerns this test
-            name = acting.mechanism.name
-            at_work[f"{name}({here.other_sample})" if here.other_sample else name] = here.values
+            name, (of_test, other_sample) = acting.mechanism.name, here
+            at_work[f"{name}({other_sample})" if other_sample else name] = of_test
     known = {
         "hold_s": c.hold_s, "specimen_run": c.specimen_run, "temperature_C": c.temperature_C,
         "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s, "elapsed_s": c.elapsed_s, "run_order": c.run_order,

@@ -35,7 +35,7 @@ def choices(base: Base, conditions: Conditions) -> tuple[str, ...]:
 
 def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
     """The same values on the tests of the specimen; None on others."""
-    return OnTest(values) if conditions.specimen[test] == choice else None
+    return (values, "") if conditions.specimen[test] == choice else None
 
 
 def in_one_run(conditions: Conditions) -> str:

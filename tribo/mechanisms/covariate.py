@@ -80,7 +80,7 @@ def _numbers(column: StringArray) -> FloatArray | None:
 
 def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest:
     """The score of the test times the amplitude."""
-    return OnTest(np.array([values[0] * score(conditions, choice)[test]]))
+    return np.array([values[0] * score(conditions, choice)[test]]), ""
 
 
 def in_one_run(conditions: Conditions) -> str:
@@ -124,4 +124,4 @@ def is_day(conditions: Conditions, choice: str) -> NDArray[np.bool_]:
 
 def on_its_day(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
     """The same values on the tests of the day; None on others."""
-    return OnTest(values) if is_day(conditions, choice)[test] else None
+    return (values, "") if is_day(conditions, choice)[test] else None

@@ -106,7 +106,7 @@ def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> O
     """The sample that the specimen of a test really is; None where its label is right."""
     here = (str(conditions.specimen[test]), str(conditions.sample[test]))
     other = next((other for specimen, label, other in moves(choice) if (specimen, label) == here), None)
-    return None if other is None else OnTest(values, other)
+    return None if other is None else (values, other)
 
 
 MECHANISM = Mechanism(

@@ -36,7 +36,7 @@ def patterns(base: Base, conditions: Conditions) -> tuple[str, ...]:
 
 def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
     """None on other patterns."""
-    return OnTest(values) if str(conditions.pattern[test]) == choice else None
+    return (values, "") if str(conditions.pattern[test]) == choice else None
 
 
 def in_one_run(conditions: Conditions) -> str:

@@ -26,14 +26,9 @@ from tribo.mechanisms.conditions import (
 )
 from tribo.records import FloatArray
 
-
-@displayed()
-@dataclass(frozen=True)
-class OnTest:
-    """How a mechanism acts on one test: its values there, and the sample that takes the place of the labelled one."""
-
-    values: Values
-    other_sample: str = ""
+OnTest = tuple[Values, str]
+"""How a mechanism acts on one test: its values there, and the sample that takes the place of the labelled one, if any.
+"""
 
 
 def no_choice(base: Base, conditions: Conditions) -> tuple[str, ...]:
@@ -43,7 +38,7 @@ def no_choice(base: Base, conditions: Conditions) -> tuple[str, ...]:
 
 def same_on_every_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
     """The values of the campaign."""
-    return OnTest(values)
+    return values, ""
 
 
 def nothing_to_choose(conditions: Conditions) -> str:

@@ -46,7 +46,7 @@ def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> O
     """The share of the whole load that is missing or added; None at the other steps."""
     if steps(conditions)[test] != choice:
         return None
-    return OnTest(np.array([values[0] * conditions.weight_N[test] / conditions.normal_load_N[test]]))
+    return np.array([values[0] * conditions.weight_N[test] / conditions.normal_load_N[test]]), ""
 
 
 def in_one_run(conditions: Conditions) -> str:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tribo import outputs
 from tribo.display import exact_text
 from tribo.errors import Problem, SimulationError, failed_by_system
 from tribo.files import whole_hdf5
@@ -33,20 +34,12 @@ if TYPE_CHECKING:
 
 ONE_RUN = "one run of the spring-block model"
 ENSEMBLE = "an ensemble of the spring-block model"
-UNITS = {
-    "s": "s", "m": "m", "Pa": "Pa", "N": "N", "deg": "degree", "N_m": "N/m", "kg_m3": "kg/m3", "per_s": "1/s",
-    "m_s": "m/s", "kg": "kg", "N_per_m": "N/m", "N_s_per_m": "N s/m", "Hz": "Hz", "m2": "m2", "Pa_per_m": "Pa/m",
-}  # fmt: skip
 Column = tuple[Any, Mapping[str, str]]  # values along the dimension, attributes
-_LONGEST_FIRST = sorted(UNITS, key=len, reverse=True)
 
 
 def unit_of(name: str) -> str:
     """Unit that ends a parameter's name ("dt_s" -> "s"), "1" where it has none."""
-    for suffix in _LONGEST_FIRST:
-        if name.endswith(f"_{suffix}") and name not in {"mu_s", "friction_mu_s"}:
-            return UNITS[suffix]
-    return "1"
+    return outputs.unit_of(name) or "1"
 
 
 def versions() -> dict[str, str]:
