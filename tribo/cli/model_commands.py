@@ -16,6 +16,7 @@ from tribo.errors import CampaignError, Problem
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tribo.design.answer import Measured
     from tribo.lawsearch.grammar import WrittenLaw
     from tribo.records import Run
     from tribo.slider import Drive, SliderConfig
@@ -408,26 +409,34 @@ def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool
 
 @click.command()
 @click.argument("target", type=GivenPath(dir_okay=False))
+@click.option(
+    "--measured", type=GivenPath(), multiple=True, metavar="CAMPAIGN",
+    help="Campaign on an earlier design, as DESIGN-N/campaign is written, with its exports. Can be repeated.",
+)  # fmt: skip
 @output_options()
 @command_options
-def design(console: Console, target: Path, out: Path, seed: int, jobs: int) -> int:
+def design(console: Console, target: Path, measured: tuple[Path, ...], out: Path, seed: int, jobs: int) -> int:
     """Find patterns for a wanted friction.
 
     TARGET.toml states the wanted friction, the families of patterns with their bounds and limits of making, and the
     material. OUT receives ranked designs with predictions and intervals, their masks, and the campaign that would
-    disprove each. If the same command is started again, it computes only the missing runs. The exit status is 1 where
-    the target cannot be had.
+    disprove each. If the same command is started again, it computes only the missing runs. With --measured, what the
+    model missed on designs that were measured corrects the prediction of new ones. The exit status is 1 where the
+    target cannot be had.
     """
     from tribo.design.answer import design as find
     from tribo.design.answer_files import write_answer
     from tribo.design.target import read_target
-    from tribo.own_folder import only_writer_of
+    from tribo.own_folder import only_writer_of, place_problems
 
     wanted = read_target(target)
+    if inside := place_problems(out, measured):
+        raise CampaignError(inside)
+    earlier = [sample for path in measured for sample in _measured(console, path, jobs)]
     kept = _kept(out, console)
     with only_writer_of(out / "answer.json", console.wait_s):
         with console.progress() as progress:
-            outcome, spaces = find(wanted, target.parent, kept, seed, jobs, progress)
+            outcome, spaces = find(wanted, target.parent, kept, seed, jobs, progress, earlier)
         write_answer(outcome, spaces, wanted, out)
     lines = [
         f"{a.rank}. " + ", ".join(f"{k} {v:g}" for k, v in a.lengths_um.items()) + "".join(
@@ -439,8 +448,21 @@ def design(console: Console, target: Path, out: Path, seed: int, jobs: int) -> i
     ]  # fmt: skip
     if outcome.refusal:
         lines = ["This cannot be had. " + "; ".join(outcome.refusal), "The nearest that can:", *lines]
+    lines += outcome.learnt
     console.result(asdict(outcome) | {"out": str(out)}, "\n".join([*lines, *outcome.notes, f"written to {out}"]))
     return UNUSABLE if outcome.refusal else 0
+
+
+def _measured(console: Console, path: Path, jobs: int) -> list[Measured]:
+    """The samples of a campaign with their laws; tests that are set aside are listed."""
+    from tribo.campaign import open_campaign
+    from tribo.design.answer import measured_of
+    from tribo.stages import StudyOptions, study
+
+    with open_campaign(path) as opened, console.progress() as progress:
+        found = study(opened, StudyOptions(jobs=jobs), until="fit", progress=progress)
+    console.status_after(found.ingested.set_aside)
+    return measured_of(found.ingested.campaign, found.fits, path.name if path.name != "campaign" else str(path))
 
 
 PATTERNS = {

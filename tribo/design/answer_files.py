@@ -220,6 +220,9 @@ def page(outcome: Outcome, target: Target, pictures: Sequence[bytes]) -> str:
             "<th>runs, %</th><th>mesh, %</th><th>model, %</th><th>making, %</th><th>met</th></tr>" + rows + "</table>"
             f"<p>{html.escape(power_of(a.predictions))}</p>"
         )
+    if outcome.learnt:
+        said = "".join(f"<li>{html.escape(line)}</li>" for line in outcome.learnt)
+        parts.append(f"<h2>What earlier designs taught</h2><ul>{said}</ul>")
     parts += [f"<p>{html.escape(note)}.</p>" for note in outcome.notes]
     style = "<style>body{font:15px sans-serif;max-width:60em;margin:2em auto}table{border-collapse:collapse}</style>"
     return f'<!doctype html><meta charset="utf-8"><title>{html.escape(target.title)}</title>{style}' + "".join(parts)

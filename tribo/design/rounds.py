@@ -9,19 +9,24 @@ the model: Gaussian processes over the free lengths, with a trend in the area fr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
+from scipy.special import log_ndtr
 
 from tribo.design.target import Space, Target, Want
-from tribo.records import FloatArray
+from tribo.records import FloatArray, Pattern
 from tribo.springblock.config import SimConfig
 from tribo.springblock.ensemble import run_seed
 from tribo.springblock.kept_runs import run_stored
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -89,8 +94,12 @@ MESHES = {
     "halved": (96, 1.25e-6, 2.5e-8),
 }  # fmt: skip
 SPREAD_DEG = 10.0
+FINE_SEED = 100  # added to the seed for fine runs, of what was measured too: both meet the same random numbers
+LEAST_SD = 1e-6
 Response = tuple[str, float, str]  # regime, pressure in Pa, direction
 Lengths = dict[str, float]
+Sds = Mapping[Response, FloatArray]  # standard deviations of ln(T/N)
+Missed = Callable[[int, Sequence[Lengths]], Mapping[Response, tuple[FloatArray, FloatArray]]]
 Say = Callable[[str, int, int], None]
 
 
@@ -162,14 +171,80 @@ def cost(target: Target, logs: dict[Response, float] | dict[Response, FloatArray
     ))  # fmt: skip
 
 
+def involved(want: Want, target: Target) -> list[Response]:
+    """The responses that a wanted quantity is made of."""
+    regimes = ("static", "sliding") if want.friction == "static over sliding" else (want.friction,)
+    directions = [d for d in (want.direction, want.over) if d is not None]
+    return [(regime, target.pressure_Pa(want), d) for regime in regimes for d in directions]
+
+
+def model_sd(want: Want, target: Target, sds: Sds) -> FloatArray:
+    """Standard deviation of ln of a wanted quantity from that of the model in its responses.
+
+    A ratio of one sample shares most of the model's error; half of it is kept.
+    """
+    parts = np.array([sds[r] for r in involved(want, target)])
+    return np.asarray(parts.max(axis=0) * (0.5 if len(parts) > 1 else 1.0))
+
+
+def improbability(target: Target, logs: dict[Response, FloatArray], sds: Sds) -> FloatArray:
+    """What a search makes small once something was measured: -ln of the probability that all is met, best values as
+    in :func:`cost`. Of designs that are predicted alike, that is least nearest to what was measured."""
+    total = np.zeros(())
+    for want in target.target:
+        if want.best is not None:
+            total = total + misses(want, target, logs)
+            continue
+        goal, tolerance = target.goal(want), math.log1p(want.tolerance_percent / 100)
+        value, sd = reached(want, target, logs), np.maximum(model_sd(want, target, sds), LEAST_SD)
+        if goal is not None:
+            low, high = math.log(goal) - tolerance, math.log(goal) + tolerance
+        else:
+            low = math.log(want.at_least) if want.at_least else -math.inf
+            high = math.log(want.at_most) if want.at_most else math.inf
+        a, b = (low - value) / sd, (high - value) / sd
+        a, b = np.where(a > 0, -b, a), np.where(a > 0, -a, b)  # in the tail where differences keep their digits
+        total = total - log_ndtr(b) - np.log1p(-np.exp(log_ndtr(a) - log_ndtr(b)))
+    return np.asarray(total)
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What every choice of a search goes by: what is wanted of which families, and what the model misses on them.
+
+    ``missed`` gives, for designs of a family, ln(measured over predicted) of every response with its standard
+    deviation. Where nothing was ``measured`` that is the same for all designs, and the plain cost decides.
+    """
+
+    target: Target
+    spaces: Sequence[Space]
+    missed: Missed
+    measured: bool = False
+
+    def corrected(
+        self, number: int, lengths: Sequence[Lengths], logs: Mapping[Response, FloatArray]
+    ) -> tuple[dict[Response, FloatArray], Sds]:
+        """ln(T/N) of designs of a family with what the model misses added, and the standard deviation of that."""
+        missed = self.missed(number, lengths)
+        return {r: logs[r] + missed[r][0] for r in logs}, {r: missed[r][1] for r in logs}
+
+    def costs(self, number: int, lengths: Sequence[Lengths], logs: Mapping[Response, FloatArray]) -> FloatArray:
+        """What a search makes small, of designs of a family with ln(T/N) as the model predicts them."""
+        corrected, sds = self.corrected(number, lengths, logs)
+        return improbability(self.target, corrected, sds) if self.measured else cost(self.target, corrected)
+
+    def cost_of(self, t: Tried) -> float:
+        """The same of one design that was run."""
+        return float(self.costs(t.space, [t.lengths_um], {r: np.array([v]) for r, v in t.logs.items()})[0])
+
+
 def designed(
-    all_rounds: Rounds, chosen: Sequence[tuple[int, Lengths]], base: SimConfig, runs: int, seed: int
+    patterns: Sequence[Pattern], wanted: Sequence[Response], base: SimConfig, runs: int, seed: int
 ) -> list[SimConfig]:
-    """The runs of some designs: each pressure and direction, the same seeds and angles for every design."""
-    points = list(dict.fromkeys((p, d) for _, p, d in all_rounds.wanted))
+    """The runs of some patterns: each pressure and direction, the same seeds and angles for every pattern."""
+    points = list(dict.fromkeys((p, d) for _, p, d in wanted))
     found = []
-    for number, lengths in chosen:
-        pattern = all_rounds.spaces[number].pattern(lengths)
+    for pattern in patterns:
         for pressure, direction in points:
             low, high = (0.0, 90.0) if direction == "all" else (-SPREAD_DEG, SPREAD_DEG)
             middle = 90.0 if direction == "y" else 0.0
@@ -187,19 +262,27 @@ def tried(
     progress: Callable[[int, int], None] | None,
 ) -> list[Tried]:  # fmt: skip
     """Run some designs, or read their runs, and return their means."""
-    wanted = all_rounds.wanted
-    configs = designed(all_rounds, chosen, base, runs, seed)
+    patterns = [all_rounds.spaces[number].pattern(lengths) for number, lengths in chosen]
+    configs = designed(patterns, all_rounds.wanted, base, runs, seed)
     table = run_stored(configs, all_rounds.folder / f"{name}.h5", all_rounds.jobs, progress=progress)
+    means = friction_of(table, all_rounds.wanted, runs)
+    return [Tried(*design, *mean) for design, mean in zip(chosen, means, strict=True)]
+
+
+def friction_of(
+    table: pd.DataFrame, wanted: Sequence[Response], runs: int
+) -> list[tuple[dict[Response, float], dict[Response, float]]]:
+    """ln(T/N) of every response and its standard error, of each pattern whose runs :func:`designed` made."""
     points = list(dict.fromkeys((p, d) for _, p, d in wanted))
     values = {
-        regime: np.log(table[f"{regime}_friction"].to_numpy(float)).reshape(len(chosen), len(points), runs)
+        regime: np.log(table[f"{regime}_friction"].to_numpy(float)).reshape(-1, len(points), runs)
         for regime in ("static", "sliding")
     }
     found = []
-    for k, (number, lengths) in enumerate(chosen):
+    for k in range(len(table) // (len(points) * runs)):
         cells = {r: values[r[0]][k, points.index(r[1:])] for r in wanted}
-        found.append(Tried(
-            number, lengths, {r: float(np.log(np.exp(v).mean())) for r, v in cells.items()},
+        found.append((
+            {r: float(np.log(np.exp(v).mean())) for r, v in cells.items()},
             {r: float(v.std(ddof=1) / math.sqrt(runs)) if runs > 1 else 0.05 for r, v in cells.items()},
         ))  # fmt: skip
     return found
@@ -221,18 +304,17 @@ def surrogates_of(spaces: Sequence[Space], known: Sequence[Tried]) -> Surrogates
 
 
 def promising(
-    spaces: Sequence[Space], known: Sequence[Tried], surrogates: Surrogates,
-    target: Target, shift: dict[Response, float], n: int, seed: int,
-) -> list[tuple[int, Lengths]]:  # fmt: skip
+    aim: Aim, known: Sequence[Tried], surrogates: Surrogates, shift: dict[Response, float], n: int, seed: int
+) -> list[tuple[int, Lengths]]:
     """The n designs of least expected cost that lie apart from each other and are not known yet."""
     pool: list[tuple[float, int, Lengths, FloatArray]] = []
-    for number, space in enumerate(spaces):
+    for number, space in enumerate(aim.spaces):
         candidates = space.candidates(CANDIDATES, seed)
         if not candidates or number not in surrogates:
             continue
         x = np.array([space.at(lengths) for lengths in candidates])
         logs = {r: s(x) + shift.get(r, 0.0) for r, s in surrogates[number].items()}
-        costs = cost(target, logs).tolist()
+        costs = aim.costs(number, candidates, logs).tolist()
         pool += [(c, number, lengths, at) for c, lengths, at in zip(costs, candidates, x, strict=True)]
     seen = {(t.space, tuple(t.lengths_um.values())) for t in known}
     chosen: list[tuple[int, Lengths]] = []
@@ -247,20 +329,22 @@ def promising(
     return chosen
 
 
+def on_mesh(base: SimConfig, name: str) -> SimConfig:
+    """The model on a mesh of ``MESHES``."""
+    n, spacing, dt = MESHES[name]
+    return base.with_(blocks=(n, n), spacing_m=spacing, thickness_m=base.layer_m, dt_s=dt, rest_tolerance=1e-2)
+
+
 def search(
-    spaces: Sequence[Space], target: Target, base: SimConfig, folder: Path, seed: int, jobs: int, say: Say
+    all_rounds: Rounds, aim: Aim, base: SimConfig, say: Say
 ) -> tuple[list[Tried], list[Tried], list[Tried], Surrogates]:
     """Coarse runs over each family, rounds of more where the surrogate expects the target, then fine ones.
 
     Returns all coarse designs, the fine ones, best first, the best one on the patch of the fine mesh and of half of
     it, and the surrogates.
     """
-    wanted = responses(target)
-    all_rounds = Rounds(spaces, wanted, folder, seed, jobs)
-    coarse, fine, patch, halved = (
-        base.with_(blocks=(n, n), spacing_m=spacing, thickness_m=base.layer_m, dt_s=dt, rest_tolerance=1e-2)
-        for n, spacing, dt in MESHES.values()
-    )
+    spaces, wanted, seed = all_rounds.spaces, all_rounds.wanted, all_rounds.seed
+    coarse, fine, patch, halved = (on_mesh(base, name) for name in MESHES)
     points = len({r[1:] for r in wanted})
     steps = (len(spaces) * FIRST + ROUNDS * BATCH) * COARSE_RUNS * points
     total, done = steps + 2 * FINAL * FINE_RUNS * points * 12, 0  # a fine run takes about twelve coarse ones
@@ -280,23 +364,23 @@ def search(
     first = [(k, lengths) for k, space in enumerate(spaces) for lengths in space.candidates(FIRST, seed)]
     known = made("first", first, coarse, COARSE_RUNS, seed, 1)
     for turn in range(ROUNDS):
-        batch = promising(spaces, known, surrogates_of(spaces, known), target, {}, BATCH, seed + 1 + turn)
+        batch = promising(aim, known, surrogates_of(spaces, known), {}, BATCH, seed + 1 + turn)
         if batch:
             known += made(f"round-{turn + 1}", batch, coarse, COARSE_RUNS, seed, 1)
     surrogates = surrogates_of(spaces, known)
-    best = sorted(known, key=lambda t: float(cost(target, t.logs)))[: FINAL // 2]
+    best = sorted(known, key=aim.cost_of)[: FINAL // 2]
     chosen = [(t.space, t.lengths_um) for t in best]
-    fine_first = made("fine-1", chosen, fine, FINE_RUNS, seed + 100, 12)
+    fine_first = made("fine-1", chosen, fine, FINE_RUNS, seed + FINE_SEED, 12)
     # what the finer mesh changes is nearly the same for neighbours: aim again with it taken into account
     shift = {r: float(np.mean([f.logs[r] - c.logs[r] for f, c in zip(fine_first, best, strict=True)])) for r in wanted}
-    again = promising(spaces, fine_first, surrogates, target, shift, FINAL - len(fine_first), seed + 50)
-    fine_all = fine_first + (made("fine-2", again, fine, FINE_RUNS, seed + 100, 12) if again else [])
-    fine_all.sort(key=lambda t: float(cost(target, t.logs)))
+    again = promising(aim, fine_first, surrogates, shift, FINAL - len(fine_first), seed + 50)
+    fine_all = fine_first + (made("fine-2", again, fine, FINE_RUNS, seed + FINE_SEED, 12) if again else [])
+    fine_all.sort(key=aim.cost_of)
     distinct: list[Tried] = []
     for t in fine_all:
         x = spaces[t.space].at(t.lengths_um)
         near = any(t.space == o.space and np.abs(x - spaces[o.space].at(o.lengths_um)).max() < 0.04 for o in distinct)
-        if not near and len(distinct) < target.designs:
+        if not near and len(distinct) < aim.target.designs:
             distinct.append(t)
     pairs = [(t.space, t.lengths_um) for t in distinct[:1]]
     finer = made("mesh-2", pairs, patch, 2, seed + 200, 6) + made("mesh-1", pairs, halved, 2, seed + 200, 40)
