@@ -52,7 +52,7 @@ QUANTITIES: dict[str, Quantity] = {
             daq fx, tensile load, zugkraft, charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft,
             friktion, wrijvingskracht, treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta,
             forca de atrito, forca de friccao, tangencialni sila, сила трения, сила, усилие, τριβη, 摩擦力, obciazenie,
-            нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 摩擦荷重, 荷重, 마찰력, 하중, 힘
+            нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 摩擦荷重, 摩擦抵抗, 摩擦抵抗力, 動摩擦力, 荷重, 마찰력, 하중, 힘
         """),
         _quantity("displacement", "x", "m", "displacement_m", """
             extension, displacement, stroke, crosshead, crosshead position, position, standard travel, standardweg,
@@ -64,7 +64,8 @@ QUANTITIES: dict[str, Quantity] = {
             desplazamiento, spostamento, deslocamento, verplaatsing, extension en traction, disp, displ,
             xyz x position, droga, przemieszczenie, wydluzenie, droga tarcia, siirtyma, matka, forskjutning,
             forflyttning, stracka, weglange, draha, posun, posuv, elmozdulas, yer degistirme, deplasare, recorrido,
-            corsa, percorso, curso, перемещение, путь, ход, 位移, 行程, 変位, ストローク, 移動距離, 변위
+            corsa, percorso, curso, traversenweg, querhauptweg, gleitweg,
+            reibweg, kolbenweg, перемещение, путь, ход, 位移, 行程, 変位, ストローク, 移動距離, 변위
         """),
         _quantity("normal force", "N", "N", "normal_force_N", """
             normal force, normal load, vertical force, normal force fz, ball load, pin load, contact force, normalkraft,
@@ -80,11 +81,13 @@ QUANTITIES: dict[str, Quantity] = {
             cof, friction coefficient, coefficient of friction, friction coeff, coeff of friction, coef of friction,
             friction coef, frictional coefficient, friction factor, coefficient friction, cof mean, mean cof, avg cof,
             average cof, cof avg, cof average, dynamic cof, kinetic cof, mean friction coefficient,
-            traction coeff, daq cof, mu, reibwert,
+            dynamic friction coefficient, kinetic friction coefficient, dynamic coefficient of friction,
+            kinetic coefficient of friction, traction coeff, daq cof, mu, reibwert,
             coefficient de frottement, reibungskoeffizient, reibzahl, reibungszahl, coefficiente di attrito,
             coeficiente de friccion, cof mu, wspolczynnik tarcia, kitkakerroin, friktionskoefficient,
             wrijvingscoefficient, koeficient treni, surtunme katsayisi, coeficient de frecare, coeficiente de atrito,
-            coeficiente de rozamiento, coefficient de friction, коэффициент трения, 摩擦系数, 摩擦係数, 마찰계수
+            coeficiente de rozamiento, coefficient de friction, коэффициент трения, 摩擦系数, 摩擦係数,
+            动摩擦系数, 動摩擦係数, 마찰계수
         """),
         _quantity("torque", "M", "N m", "torque_Nm", """
             friction torque, torque, frictional torque, axial torque, spindle torque, measured torque, torque cell,
@@ -217,6 +220,7 @@ _SPELLINGS = {
     "lbf": "pound_force",
     "lb": "pound_force",
     "lbs": "pound_force",
+    "ozf": "ounce_force",
     "kips": "kip",
     "µm": "micrometer",
     "μm": "micrometer",
@@ -280,7 +284,7 @@ _TURNS = {
     "giri/min": "revolution/minute", "ot/min": "revolution/minute",
 }  # fmt: skip
 _MASSES_AS_FORCES = {"g": "gram_force", "kg": "kilogram_force"}
-_NO_UNIT = {"", "-", "1"}
+_NO_UNIT = {"", "-", "1", ".", "--", "none"}
 _LONGEST_UNIT = 40
 # A product of words and numbers with powers of one digit: nothing that could take long to work out.
 _FACTOR = r"\(?[\d.]*\s*[^\W\d_]+[²³]?(?:\^-?\d)?\)?"
@@ -292,7 +296,8 @@ _LONGEST_NAME = 80  # characters; longer cells are no column names
 _WIDE = str.maketrans("（）［］【】：／，　･・", "()[][]:/, ··")
 _BARRED = str.maketrans({"ł": "l", "ø": "o", "đ": "d", "ß": "ss", "æ": "ae", "œ": "oe", "ı": "i"})
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
-_CHANNEL = re.compile(r"^\s*(?:c|ch|channel|kanal)[ _]?\d+[ _]", re.I)
+# what a logger writes before the name of a column: "C_1_Force", "Station 1 Force", "Latest: Force", "Run #2: Force"
+_CHANNEL = re.compile(r"^\s*(?:(?:c|ch|channel|kanal|station)[ _]?\d+[ _]|(?:latest|run #?\d+)\s*:\s*)", re.I)
 
 
 def narrow(text: str) -> str:

@@ -17,8 +17,14 @@ from tribo.errors import Problem, ReadError
 from tribo.input_files import LARGEST_NUMBER, SMALLEST_NUMBER
 from tribo.readers.columns import Column, force_follows
 from tribo.records import Correction, FloatArray
+from tribo.units import plain_name
 
 NO_TIME = "no_time"
+_FORCES_OF_NO_KIND = {
+    "force", "kraft", "f", "effort", "fuerza", "forza", "forca", "kracht", "sila", "voima", "kuvvet", "forta",
+    "load cell", "axial force", "standard force", "standardkraft", "prufkraft", "force standard", "сила", "усилие",
+    "力", "試験力", "힘",
+}  # fmt: skip
 _PATH_FOR_TIME_M_S = 1e-3  # 1 mm of path counts as 1 s where neither time nor speed is known
 GAP_STEPS = 5.0  # a time step this many median steps long is a gap
 _WORTH_A_LOOK = 1.5  # mean steps: where no step is this long, none is a gap
@@ -44,7 +50,7 @@ def complete(
     Raises
     ------
     ReadError
-        no_radius or load_is_friction.
+        no_radius, load_is_friction or force_may_be_load.
     """
     columns, doubts = list(columns), []
     arrays, columns = _forces(arrays, columns, correction, file)
@@ -82,6 +88,7 @@ def _forces(arrays: Arrays, columns: list[Column], stated: Correction, file: str
     ------
     ReadError
         load_is_friction: the load follows the friction coefficient, so that it may be the friction force.
+        force_may_be_load: the force does not follow it, so that it may be the normal load.
     """
     label = {c.quantity: c.label for c in columns}
     arrays = dict(arrays)
@@ -95,6 +102,8 @@ def _forces(arrays: Arrays, columns: list[Column], stated: Correction, file: str
         add("normal force", arrays["normal stress"] * stated.area_m2, "normal stress", reason)
     mu, load = arrays.get("friction coefficient"), arrays.get("normal force")
     if "friction force" in arrays:
+        if mu is not None and load is None:
+            _refuse_a_force_that_may_be_the_load(arrays["friction force"], mu, columns, file)
         if mu is not None and load is None and (constant := _constant_ratio(arrays["friction force"], mu)):
             reason = "friction force over friction coefficient, the same in all rows"
             add("normal force", np.full(mu.size, constant), "friction coefficient", reason)
@@ -124,6 +133,30 @@ def _forces(arrays: Arrays, columns: list[Column], stated: Correction, file: str
         reason = f"friction coefficient times the load of {stated.load_N:g} N, as given"
         add("friction force", mu * float(stated.load_N or 0.0), "friction coefficient", reason)
     return arrays, columns
+
+
+def _refuse_a_force_that_may_be_the_load(
+    force: FloatArray, mu: FloatArray, columns: Sequence[Column], file: str
+) -> None:
+    """A force of no particular name beside a friction coefficient is friction only where it varies with it.
+
+    Raises
+    ------
+    ReadError
+        force_may_be_load.
+    """
+    column = next(c for c in columns if c.quantity == "friction force")
+    if not column.reason.startswith("named") or plain_name(column.label) not in _FORCES_OF_NO_KIND:
+        return
+    large = np.abs(mu) > 0.3 * np.abs(mu).max()
+    if large.sum() < _FEWEST_ROWS or not np.all(force[large]):
+        return
+    log_force = np.log(np.abs(force[large]))
+    if np.std(log_force - np.log(np.abs(mu[large]))) > 0.5 * np.std(log_force):
+        what = "a force that does not follow the friction coefficient beside it, so it may be the normal load"
+        name = column.label
+        allowed = f'normal_force = "{name}" in columns; or friction_force = "{name}" if it is the friction'
+        raise ReadError(Problem("force_may_be_load", what, file, None, name, allowed=allowed))
 
 
 def _constant_ratio(over: FloatArray, under: FloatArray, spread: float = _SAME_RATIO) -> float | None:

@@ -28,21 +28,29 @@ _MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coeffic
     "하중",
 }  # fmt: skip
 _A_RATIO_BESIDE_STRESS = {"friction", "friktion", "frottement", "tarcie", "reibung"}  # without a unit
+_WITHOUT_DIMENSION = ("-", "1")
 _LOAD_AND_PATH = ("normal force", "displacement")  # what a test is about: an unknown unit of theirs is a fault
 _ALONG_THE_AXIS = {"axial force", "axial load", "thrust", "thrust force"}
 _SAYS_FRICTION = re.compile(
     r"friction|friccion|rozamiento|frottement|attrito|atrito|friktion|reib|tarci|wrijving|treni|surtunme|frecare|kitka|"
     r"tangential|tangentiel|трени|摩擦力|마찰력"
 )
+_SAYS_SLIDING_SPEED = re.compile(r"sliding (?:speed|velocity)|gleitgeschwindigkeit|vitesse de glissement")
+_SAYS_DEPTH = re.compile(r"\bdepth\b|penetration|indentation|eindring|profondeur|profundidad")
 _SAYS_NORMAL = re.compile(r"\bnorma[al]|normalkraft|normallast|нормальн|法向|垂直力|수직")
 _NO_FORCE = re.compile(r"set ?point|\bset\b|target|soll|limit|max|min|\bstd\b|\bsd\b|deviation|error|zero|offset")
 _CLOCK_OF_RATE = re.compile(r"^(?:zeit|time|temps)\b.*rate$")  # "Zeit  1 - Standardmessrate"
 _ONLY_WITH_UNIT = ("radius", "normal stress", "shear stress")  # of no use without one, and missed by nobody
-_A_RATIO = re.compile(r"\b(?:cof|coeff?|coefficient|koeffizient|coefficiente?)\b|friction factor|reibwert|reibzahl")
+_A_RATIO = re.compile(
+    r"\b(?:cof|coeff?|coefficient|koeffizient|coefficiente?)\b|friction factor|reibwert|reibzahl|摩擦[係系]数"
+)
 _RPM = ("rpm", "RPM", "rev/min", "r/min", "1/min", "U/min", "tr/min", "obr/min", "об/мин", "转/分")
+_OF_A_CONVERTER = re.compile(r"[mµu]?v(?:olts?)?|[mµu]?v/v|bits?|counts?|digits?|adc|raw|lsb", re.I)
 _ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
+_AFTER_BLANK = re.compile(r"^(.*\S)\s+((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
+_RUN_BEHIND = re.compile(r"(.*[\])])\s+(run\s*#?\s*\d+)\s*", re.I)  # "Force (N) Run #1" is "Run #1: Force (N)"
 
 TABLE_OPTION = "--table sample=COLUMN,normal_load_N=COLUMN,coefficient=COLUMN"
 
@@ -63,15 +71,21 @@ def match_column(name: str) -> tuple[str, int] | None:
 
 @lru_cache(maxsize=1024)
 def split_unit(name: str) -> tuple[str, str | None]:
-    """("Kraft", "kN") of "Kraft [kN]", "Kraft (kN)", "Kraft / kN", "Kraft/kN", "Kraft in kN", "Kraft_kN"."""
+    """("Kraft", "kN") of "Kraft [kN]", "Kraft (kN)", "Kraft / kN", "Kraft/kN", "Kraft in kN", "Kraft_kN", "Kraft kN".
+
+    A number of a run behind them, as in "Kraft (kN) Run #1", comes before the name.
+    """
     name = narrow(name)
+    if found := _RUN_BEHIND.fullmatch(name):
+        name = f"{found.group(2)}: {found.group(1)}"
     found = _BRACKETS.search(name)
     if found:
         return name[: found.start()].strip().removesuffix("/").strip(), found.group(1).strip()
-    found = _AFTER_MARK.match(name)
-    hit = match_quantity(found.group(1)) if found and match_quantity(name) is None else None
-    if found and hit and (is_unit(found.group(2), hit[0]) or (hit[0] == "speed" and turns_a_time(found.group(2)))):
-        return found.group(1).strip(), found.group(2)
+    for pattern in (_AFTER_MARK, _AFTER_BLANK):
+        found = pattern.match(name)
+        hit = match_quantity(found.group(1)) if found and match_quantity(name) is None else None
+        if found and hit and (is_unit(found.group(2), hit[0]) or (hit[0] == "speed" and turns_a_time(found.group(2)))):
+            return found.group(1).strip(), found.group(2)
     return name, None
 
 
@@ -304,8 +318,10 @@ def _columns(
             called = _called(names, index)
             way = f'{quantity.replace(" ", "_")} = "{split_unit(called)[0]} [unit]" in columns, the unit such as '
             units_of = {"ambiguous_unit": "gf or N"}
+            volts = bool(_OF_A_CONVERTER.fullmatch(_unit_of(names, units, index)))
+            calibrated = f'; of a raw signal, what 1 of it means: "{split_unit(called)[0]} [12.5 N]"' if volts else ""
             found = [
-                replace(p, column=called, allowed=way + units_of.get(p.kind, QUANTITIES[quantity].si_unit))
+                replace(p, column=called, allowed=way + units_of.get(p.kind, QUANTITIES[quantity].si_unit) + calibrated)
                 for p in why.problems
             ]
             replaced = quantity == "time" and correction.sampling_rate_Hz is not None
@@ -325,10 +341,11 @@ def _matches(
     names: Sequence[str], units: Sequence[str], filled: Sequence[bool], taken: set[int], asked: set[str]
 ) -> list[tuple[str, int, str]]:
     """(quantity, index, reason) of the best-named column of each quantity; the first of equal ones."""
+    raw = raw_signals(names, units)
     hits = {
         index: _by_its_unit(names, units, index, hit)
         for index, name in enumerate(names)
-        if name and index not in taken and filled[index] and (hit := match_column(name))
+        if name and index not in taken | raw and filled[index] and (hit := match_column(name))
     }
     for index in sorted({*range(len(names))} - taken - set(hits)):
         if filled[index] and names[index] and (hit := by_a_word(names[index], _unit_of(names, units, index))):
@@ -341,8 +358,10 @@ def _matches(
     loads = [index for index in hits if split_unit(names[index])[0].strip().lower() in _MEANS_NORMAL_BESIDE_FRICTION]
     friction = [(rank, index) for index, (quantity, rank) in hits.items() if quantity == "friction force"]
     of_another = "friction force" in asked or bool(friction and min(friction)[1] not in loads)
-    ratio = there & {"friction coefficient", "torque"} or any(map(_A_RATIO.search, map(plain_name, names)))
-    if not of_another and not ratio:
+    plain = [plain_name(name) for name in names]
+    pressed = "displacement" not in there and any(map(_SAYS_DEPTH.search, plain))  # an indenter
+    ratio = there & {"friction coefficient", "torque"} or any(map(_A_RATIO.search, plain))
+    if not (of_another or ratio or pressed):
         loads = [index for _, index in sorted(friction)[1:] if index in loads]
     for index in loads:  # a load beside what friction is read from is the normal one; it comes after those named so
         if hits[index][0] == "friction force":
@@ -352,6 +371,14 @@ def _matches(
         if quantity not in best or rank < best[quantity][0]:
             best[quantity] = (rank, index)
     return [(q, index, f'named "{names[index]}"') for q, (_, index) in best.items()]
+
+
+def raw_signals(names: Sequence[str], units: Sequence[str]) -> set[int]:
+    """Columns in volts of what another column holds in its unit: a machine may write both."""
+    hits = {k: hit[0] for k, name in enumerate(names) if name and (hit := match_column(name))}
+    raw = {k for k in hits if _OF_A_CONVERTER.fullmatch(_unit_of(names, units, k))}
+    measured = {hits[k] for k in set(hits) - raw if is_unit(_unit_of(names, units, k), hits[k])}
+    return {k for k in raw if hits[k] in measured}
 
 
 def by_a_word(name: str, unit: str) -> tuple[str, int] | None:
@@ -366,6 +393,8 @@ def by_a_word(name: str, unit: str) -> tuple[str, int] | None:
             return "normal force", len(QUANTITIES["normal force"].aliases) + 1
         if _SAYS_FRICTION.search(plain):  # before names such as load or force, which say less
             return "friction force", QUANTITIES["friction force"].aliases.index("lateral force")
+    if _SAYS_SLIDING_SPEED.search(plain) and unit and is_unit(unit, "speed"):
+        return "speed", len(QUANTITIES["speed"].aliases)
     return None
 
 
@@ -376,9 +405,10 @@ def _by_its_unit(names: Sequence[str], units: Sequence[str], index: int, hit: tu
         return "rotation speed", hit[1]
     if hit[0] == "rotation speed" and unit and not turns_a_time(unit) and is_unit(unit, "speed"):
         return "speed", hit[1]
-    is_ratio = hit[0] == "friction force" and not unit and plain_name(names[index]) in _A_RATIO_BESIDE_STRESS
-    if is_ratio and any((other := match_column(name)) and other[0] == "normal stress" for name in names):
-        return "friction coefficient", hit[1]
+    if hit[0] == "friction force" and plain_name(split_unit(names[index])[0]) in _A_RATIO_BESIDE_STRESS:
+        beside_stress = any((other := match_column(name)) and other[0] == "normal stress" for name in names)
+        if unit in _WITHOUT_DIMENSION or (not unit and beside_stress):
+            return "friction coefficient", hit[1]
     return hit
 
 

@@ -13,7 +13,17 @@ import numpy as np
 from tribo.display import displayed
 from tribo.errors import Problem, ReadError
 from tribo.input_files import MAPPED_BYTES
-from tribo.readers.columns import NEEDED, Column, Columns, Given, assign, match_column, parse_columns
+from tribo.readers.columns import (
+    NEEDED,
+    Column,
+    Columns,
+    Given,
+    assign,
+    bare_unit,
+    match_column,
+    parse_columns,
+    raw_signals,
+)
 from tribo.readers.layout import Layout, first_table
 from tribo.readers.reading import (
     FATAL,
@@ -245,7 +255,7 @@ def _columns(
     for k in range(layout.n_cells):
         column = taken.get(k)
         if column is None:
-            seen.append(ColumnSeen(k + 1, layout.names[k], layout.units[k], reason=passed_over.get(k, "")))
+            seen.append(ColumnSeen(k + 1, layout.names[k], bare_unit(layout.units[k]), reason=passed_over.get(k, "")))
         else:
             unit = column.label.rpartition("[")[2].rstrip("]") if "[" in column.label else ""
             seen.append(ColumnSeen(k + 1, layout.names[k], unit, column.quantity, column.reason))
@@ -312,13 +322,13 @@ def _doubts(reading: ReadTable, file: str) -> list[Problem]:
 def _other_candidates(reading: ReadTable) -> list[Problem]:
     """Columns that could stand for a needed quantity as well as the one that was taken."""
     layout = reading.layout
-    taken = {c.index for c in reading.columns}
+    taken, raw = {c.index for c in reading.columns}, raw_signals(layout.names, layout.units)
     doubts = []
     for column in (c for c in reading.columns if c.quantity in NEEDED):
         others = [
             layout.names[k]
             for k in range(layout.n_cells)
-            if k not in taken
+            if k not in taken | raw
             and layout.filled[k]
             and (hit := match_column(layout.names[k]))
             and hit[0] == column.quantity

@@ -246,7 +246,7 @@ def _known(name: str, given: Given) -> bool:
 
 def _delimiter(rows: Sequence[str], file: str) -> str:
     for delimiter in "\t;|":
-        if 2 * sum(delimiter in row.strip() for row in rows) > len(rows):
+        if 2 * sum(_separates(delimiter, row) for row in rows) > len(rows):
             return delimiter
     row = rows[-1] if len(rows) < 3 else rows[1]
     words = row.replace('"', "").split()
@@ -257,6 +257,13 @@ def _delimiter(rows: Sequence[str], file: str) -> str:
     what = "only one column was found; a trace needs time and force"
     allowed = "an export with the time, or the displacement, in a column beside the force"
     raise ReadError(Problem("one_column", what, file=file, found=row[:60], allowed=allowed))
+
+
+def _separates(delimiter: str, row: str) -> bool:
+    """Whether a delimiter stands between cells: of bars, those within a cell such as "1|7" separate none."""
+    if delimiter != "|" or "," not in row:
+        return delimiter in row.strip()
+    return all(not cell or _COMMA_NUMBER.fullmatch(cell) or cell.isdigit() for cell in cut(row, "|"))
 
 
 def _decimal(rows: Sequence[Sequence[str]]) -> str:

@@ -482,8 +482,14 @@ def _explained(why: ReadError, machine: Machine, source: Source, layout: Layout)
         # the load that a coefficient needs is no matter of names and units
         problems = [p if p.kind == "missing_load" else replace(p, allowed=machine.advice) for p in problems]
     elif looks_wide(layout):
-        problems = [replace(p, allowed=f"{_WIDE}; {p.allowed}") for p in problems]
+        problems = [p if p.kind != "missing_column" else replace(p, allowed=_with_wide(p.allowed)) for p in problems]
     return problems
+
+
+def _with_wide(allowed: str | None) -> str:
+    """What is allowed, with the way of a wide table before the list of columns."""
+    ways, mark, here = (allowed or "").partition("columns here: ")
+    return f"{ways}{_WIDE}; {mark}{here}"
 
 
 def _row_of(source: Source, layout: Layout, sample: int) -> int:

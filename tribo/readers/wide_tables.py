@@ -8,13 +8,14 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.columns import Given, Hint, bare_unit, by_a_word, is_unit, match_column, split_unit
+from tribo.readers.columns import Given, Hint, bare_unit, by_a_word, is_unit, match_column, raw_signals, split_unit
 from tribo.readers.layout import Layout, cut
 from tribo.readers.source import Source
 from tribo.units import QUANTITIES
 
 _NUMBER_BEHIND = re.compile(r"(?<=\w)[ ._#-]*\(?\d+\)?$")
 _NUMBER_BEFORE = re.compile(r"^(?:specimen|sample|probe|test|run|pull|s|p|n)?[ _#]*\d+[ _:.-]+(?=\w)", re.I)
+_RUN_BEFORE = re.compile(r"run #?\d+:", re.I)
 _NUMERIC = re.compile(r"[-+]?\d*[.,]?\d+")
 _NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "-", "--", "null", "none"})
 
@@ -75,7 +76,9 @@ def _records(layout: Layout, given: Given) -> Sequence[Record]:
     for groups in _repeats(named, [names[k] for k in named], 2):  # the same names several times in a row
         if len({names[k] for k in groups[0]}) == len(groups[0]):
             return [("", group, group, ()) for group in groups]
+    raw = raw_signals(names, layout.units)
     used = [k for k in range(layout.n_cells) if (names[k] or layout.filled[k]) and not given.ignores(k, names[k])]
+    used = [k for k in used if k not in raw]
     stems = {k: _stem(names[k]) for k in used}
     meant = {k: _quantity(stem) for k, stem in stems.items()}
     times = tuple(k for k in used if meant[k] == "time")
@@ -115,7 +118,13 @@ def looks_wide(layout: Layout) -> bool:
     """Whether a table has a time and at least two further columns, none of which is a known quantity."""
     filled = [name for name, there in zip(layout.names, layout.filled, strict=True) if there or name]
     known = [_quantity(name) for name in filled if _quantity(name)]
-    return known == ["time"] and len(filled) > 2
+    units = [
+        bare_unit(unit) or split_unit(name)[1] or ""
+        for name, unit in zip(layout.names, layout.units, strict=True)
+        if name and _quantity(name) != "time"
+    ]
+    of_another = any(unit and not is_unit(unit, "friction force") for unit in units)
+    return known == ["time"] and len(filled) > 3 and not of_another
 
 
 def _quantity(name: str) -> str:
@@ -126,7 +135,7 @@ def _quantity(name: str) -> str:
 def _stem(name: str) -> str:
     """A name without the number of its specimen: "Load.2", "Load (2)" and "S2 Load [N]" are all "Load"."""
     bare = split_unit(name)[0]
-    if _quantity(bare) and not _NUMBER_BEHIND.search(bare):
+    if _quantity(bare) and not _NUMBER_BEHIND.search(bare) and not _RUN_BEFORE.match(bare):
         return bare
     return _NUMBER_BEFORE.sub("", _NUMBER_BEHIND.sub("", bare)) or bare
 

@@ -1,0 +1,118 @@
+"""Exports in the shape of those of machines that were met after the readers were written; every number is invented."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribo.errors import ReadError
+from tribo.readers import inspect_export, read_blocks, read_export
+
+N = 120
+TIME = 0.05 * np.arange(N)
+FRICTION = 0.9 + 0.05 * np.sin(3.0 * TIME)
+
+
+def saved(folder: Path, header: str, *columns: np.ndarray, encoding: str = "utf-8") -> Path:
+    mark = "\t" if "\t" in header else ";" if ";" in header else ","
+    rows = (mark.join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True))
+    path = folder / "a.csv"
+    path.write_bytes((header + "\n" + "\n".join(rows) + "\n").encode(encoding))
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(ReadError) as why:
+        read_export(path)
+    return str(why.value)
+
+
+def test_a_japanese_load_beside_a_resistance_of_friction_is_the_normal_load(tmp_path: Path) -> None:
+    load = np.full(N, 2.0)
+    trace = read_export(saved(tmp_path, "時間(s),荷重(N),摩擦抵抗(N)", TIME, load, FRICTION, encoding="cp932"))
+    np.testing.assert_allclose(trace.force_N, FRICTION, rtol=1e-5)
+    np.testing.assert_allclose(trace.columns["normal_force_N"], load)
+
+
+@pytest.mark.parametrize(("force", "read"), [(6.0 * FRICTION, True), (6.0 + 0.001 * TIME, False)])
+def test_a_force_beside_a_coefficient_is_friction_only_where_it_follows_it(
+    tmp_path: Path, force: np.ndarray, read: bool
+) -> None:
+    path = saved(tmp_path, "t\tforce\tfriction\ns\tN\t-", TIME, force, FRICTION)
+    if read:
+        trace = read_export(path)
+        np.testing.assert_allclose(trace.force_N, force, rtol=1e-5)
+        np.testing.assert_allclose(trace.columns["normal_force_N"], 6.0, rtol=1e-3)
+    else:
+        assert "it may be the normal load" in refusal(path)
+        trace = read_export(path, columns={"normal_force": "force [N]"})
+        np.testing.assert_allclose(trace.force_N, force * FRICTION, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Latest: Time (s),Latest: Force (N),Latest: Position (m)",
+        "Run 3: Time (s),Run 3: Force (N),Run 3: Position (m)",
+        "Time (s) Run #3,Force (N) Run #3,Position (m) Run #3",
+        "Time s,Force N,Position m",
+        "Station 1 Time\tStation 1 Force\tStation 1 Displacement\ns\tN\tm",
+    ],
+)
+def test_the_run_or_the_station_before_or_behind_a_name_does_not_hide_it(tmp_path: Path, header: str) -> None:
+    trace = read_export(saved(tmp_path, header, TIME, FRICTION, 1e-3 * TIME))
+    np.testing.assert_allclose(trace.force_N, FRICTION, rtol=1e-5)
+    assert trace.displacement_m is not None
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["Run 1: Time (s),Run 1: Force (N),Run 2: Time (s),Run 2: Force (N)",
+     "Time (s) Run #1;Force (N) Run #1;Time (s) Run #2;Force (N) Run #2"],
+)  # fmt: skip
+def test_the_runs_of_a_school_logger_are_records_side_by_side(tmp_path: Path, header: str) -> None:
+    first, second = read_blocks(saved(tmp_path, header, TIME, FRICTION, TIME, 2.0 * FRICTION))
+    np.testing.assert_allclose(first.force_N, FRICTION, rtol=1e-5)
+    np.testing.assert_allclose(second.force_N, 2.0 * FRICTION, rtol=1e-5)
+
+
+def test_a_force_gauge_in_ounce_force_is_read(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Reading,Load [ozF],Travel [mm],Time [sec]", np.arange(N), FRICTION, TIME, TIME)
+    np.testing.assert_allclose(read_export(path).force_N, 0.278014 * FRICTION, rtol=1e-4)
+
+
+def test_a_channel_that_is_written_in_volts_as_well_is_read_in_its_unit(tmp_path: Path) -> None:
+    header = "Normal Load (µN)\tTime (s)\tLateral Force (V)\tLateral Force (µN)"
+    path = saved(tmp_path, header, np.full(N, 1000.0), TIME, 0.01 * FRICTION, 100.0 * FRICTION)
+    np.testing.assert_allclose(read_export(path).force_N, 1e-4 * FRICTION, rtol=1e-5)
+    assert not inspect_export(path).doubts or "could also be" not in inspect_export(path).in_words()
+
+
+def test_the_load_of_an_indenter_is_not_taken_for_friction(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Depth (nm)\tLoad (µN)\tTime (s)\tDepth (V)\tLoad (V)", TIME, TIME, TIME, TIME, TIME)
+    assert "no column was recognised as the friction force" in refusal(path)
+
+
+def test_a_force_in_volts_is_refused_with_the_way_to_calibrate_it(tmp_path: Path) -> None:
+    path = saved(tmp_path, "t [s],Friction force [V]", TIME, 0.04 * FRICTION)
+    assert 'what 1 of it means: "Friction force [12.5 N]"' in refusal(path)
+    trace = read_export(path, columns={"friction_force": "Friction force [12.5 N]"})
+    np.testing.assert_allclose(trace.force_N, 0.5 * FRICTION, rtol=1e-5)
+
+
+def test_bars_within_cells_do_not_separate_them(tmp_path: Path) -> None:
+    rows = "\n".join(f"1|{k},{t:.2f},{f:.4f}" for k, (t, f) in enumerate(zip(TIME, FRICTION, strict=True)))
+    (tmp_path / "a.csv").write_text(f"point,t in s,force in N\n{rows}\n", encoding="utf-8")
+    np.testing.assert_allclose(read_export(tmp_path / "a.csv").force_N, FRICTION, atol=1e-4)
+
+
+def test_records_side_by_side_are_not_proposed_for_columns_of_other_units(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Time (s)\tPitch Moment (Nm)\tBelt Velocity (m/s)\tBelt Angle (deg)", TIME, TIME, TIME, TIME)
+    assert "side by side" not in refusal(path)
+
+
+def test_a_row_of_bracketed_units_is_shown_without_further_brackets(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Time\tForce\tHeater\n[s]\t[N]\t[W]", TIME, FRICTION, TIME)
+    assert '"Heater" [W]\n' in inspect_export(path).in_words()
