@@ -142,6 +142,16 @@ def test_a_step_of_speed_is_seen_in_the_displacement_alone() -> None:
     assert names == ["steady sliding", "step of speed", "steady sliding"]
 
 
+@pytest.mark.parametrize("ramp_s", [0.0, 1.0])
+def test_a_step_of_speed_lies_within_a_sample_of_where_a_noisy_displacement_bends(ramp_s: float) -> None:
+    time = np.arange(3000) / 20
+    v = 1e-6 * np.interp(time, [80.0, 80.0 + max(ramp_s, 1e-9)], [1.0, 3.0])
+    x = np.cumsum(v) / 20 + noise(3000, 5, 2e-8)
+    ((start, end),) = of_phase(Trace("steps", time, 4.0 + noise(3000, 6), x), "step of speed")
+    assert start == pytest.approx(80.0, abs=0.1)
+    assert end == pytest.approx(80.0 + ramp_s, abs=0.1)
+
+
 def test_a_rough_force_has_no_quiet_end_and_a_force_that_stops_being_rough_has_one() -> None:
     rough = 2.0 + noise(500, 1, 0.02)
     assert quiet_end(rough) == 500
@@ -195,6 +205,13 @@ def test_two_speeds_of_one_displacement_are_two_pieces_and_a_little_faster_is_on
     for ratio, pieces in ((3.0, 2), (1.2, 1)):
         x = np.where(time < 200, 1e-6 * time, 2e-4 + ratio * 1e-6 * (time - 200)) + noise(4000, 0, 1e-7)
         assert len(split_pulls(Trace("gouge", time, 10.0 + noise(4000), displacement_m=x))) == pieces
+
+
+def test_a_hold_that_only_a_displacement_tells_parts_no_slide() -> None:
+    time = np.arange(12000) / 50
+    x = np.cumsum(np.where(time % 120 < 40, 1e-3, 0.0)) / 50 + noise(12000, 3, 1e-6)
+    force = np.where(time % 120 < 40, 3.0, 2.6) + noise(12000, 4)
+    assert len(split_pulls(Trace("holds", time, force, displacement_m=x))) == 1
 
 
 def test_noise_of_a_tachometer_at_rest_is_no_stroke() -> None:

@@ -18,7 +18,7 @@ from tribo.errors import CampaignError
 from tribo.records import Ingested, Reading, Restart, Study, Test, Trace
 from tribo.report.tables import readings_table
 from tribo.traces import PullOptions, evaluate
-from tribo.traces.readings import Part, readings_of
+from tribo.traces.readings import Part, _exponential, readings_of
 from tribo.traces.signal import mean_of_level
 
 TEST = Test("T1", "raw/T1.csv", "S", 10.0, "S1")
@@ -99,6 +99,30 @@ def test_a_step_of_speed_has_a_change_at_once_and_a_total_change() -> None:
     assert step.values["direct_change_N"][1] < 0.3 < step.values["direct_change_N"][2]
 
 
+def test_the_change_at_once_of_a_step_that_only_a_displacement_tells_is_not_lost_in_its_smoothing() -> None:
+    time, found = np.arange(1600) / 10, []
+    for seed in range(12):
+        after = np.maximum(time - 100.0, 0.0)
+        x = 1e-6 * (time + 9.0 * after) + noise(1600, seed, 2e-8, 0.1)
+        force = np.where(time < 100, 6.0, 5.8 + 0.5 * np.exp(-after / 1.5)) + noise(1600, seed + 50, 0.005, 2.0)
+        (step,) = (r for r in read(Trace("gouge", time, force, x)) if r.name == "step of speed")
+        found.append(step.values["direct_change_N"])
+    assert np.median([value for value, _, _ in found]) == pytest.approx(0.3, rel=0.04)
+    assert sum(low <= 0.3 <= high for _, low, high in found) >= 11
+
+
+def test_the_total_change_of_a_step_holds_nothing_of_the_force_that_still_settles() -> None:
+    time, held = np.arange(1200) / 10, 0
+    after = np.maximum(time - 60.0, 0.0)
+    for seed in range(24):
+        force = np.where(time < 60, 6.0, 5.8 + 0.5 * np.exp(-after / 5.0)) + noise(1200, seed, 0.003, 2.0)
+        columns = {"speed_m_s": np.where(time < 60, 1e-3, 1e-2)}
+        (step,) = (r for r in read(Trace("gouge", time, force, columns=columns)) if r.name == "step of speed")
+        _, low, high = step.values["total_change_N"]
+        held += low <= -0.2 <= high
+    assert held >= 21
+
+
 def strokes(zero_N: float = 0.1) -> dict[str, np.ndarray]:
     """Strokes of 9 mm at 2 mm/s and 1.5 N, then half a second of rest."""
     time = np.arange(6000) / 100
@@ -142,6 +166,17 @@ def test_the_distance_of_running_in_is_read_with_its_interval() -> None:
     assert sum(r.values["run_in_s"][1] <= true_s <= r.values["run_in_s"][2] for r in steady) >= 0.8 * len(steady)
     assert steady[0].values["run_in_m"][0] == pytest.approx(0.1 * steady[0].values["run_in_s"][0])
     assert steady[0].values["force_N"][0] == pytest.approx(4.0, abs=0.03)
+
+
+def test_the_interval_of_running_in_holds_where_the_noise_is_as_large_as_the_force() -> None:
+    time, held, read_s = np.arange(240.0), 0, 0.07 * 240 * math.log(10.0)
+    rng = np.random.default_rng(4)
+    for _ in range(300):
+        force = 1.0 + np.exp(-time / (0.07 * 240))
+        fitted = _exponential(time, force * (1.0 + 0.02 * rng.standard_normal(240)))
+        assert fitted is not None
+        held += fitted[1][1] <= read_s <= fitted[1][2]
+    assert 0.92 <= held / 300 <= 0.98
 
 
 @pytest.mark.parametrize("share", first_quick([0.4, 1.0, 5.0]))

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from tribo.records import FloatArray, Trace
-from tribo.traces.drive import Mask, at_rest_below, drive_of, level_cuts, stroke_end
+from tribo.traces.drive import DriveMotion, at_rest_below, drive_of, level_cuts, speed_cuts, stroke_end
 from tribo.traces.signal import MINIMUM_SAMPLES, median_of_three, running_mean, runs_of, sample_noise, wander
 
 _AT_REST = 0.05  # share of the usual speed below which the drive stands still
@@ -48,7 +48,7 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
         cuts += [(a, b) for a, b in find(moving) if moving[max(a - 1, 0)] > rest]
     drive = drive_of(trace) if speed is None and not cuts else None
     if drive is not None and drive.channel == "displacement":
-        cuts += _speeds_by_displacement(np.abs(drive.pace), drive.moving)
+        cuts += _speeds_by_displacement(trace, drive)
     if not cuts:
         return (trace,)
     stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
@@ -65,9 +65,12 @@ def _steps_or_levels(values: FloatArray) -> list[tuple[int, int]]:
     return every if len(every) > len(large) else large
 
 
-def _speeds_by_displacement(pace: FloatArray, moving: Mask) -> list[tuple[int, int]]:
+def _speeds_by_displacement(trace: Trace, drive: DriveMotion) -> list[tuple[int, int]]:
     """The steps between two speeds that differ clearly, as the slope of a displacement is rough."""
-    cuts = [(a, b) for a, b in level_cuts(pace) if moving[max(a - 1, 0)] and moving[min(b, moving.size - 1)]]
+    pace, moving = np.abs(drive.pace), drive.moving
+    found = speed_cuts(trace, drive, (0, pace.size))
+    moves = [b > a and float(moving[a:b].mean()) > 0.5 for a, b in between(found, pace.size)]
+    cuts = [cut for cut, (one, other) in zip(found, pairwise(moves), strict=True) if one and other]
     ends = [0, *(k for cut in cuts for k in cut), pace.size]
     levels = [float(np.median(pace[a:b])) for a, b in zip(ends[::2], ends[1::2], strict=True)]
     apart = [max(one, other) > _CLEARLY_APART * min(one, other) for one, other in pairwise(levels)]

@@ -18,6 +18,7 @@ from tribo.records import FloatArray, Trace
 from tribo.traces.signal import (
     MINIMUM_SAMPLES,
     condense,
+    line,
     median_of_three,
     running_mean,
     runs_of,
@@ -50,6 +51,7 @@ _OF_NOISE = 6.0  # and this many times the noise of the difference
 _QUARTER = 0.25  # share of the way between two levels at which a passage is placed
 _SHORTEST = 0.02  # share of a motion that a level lasts at the least
 _SETS_OUT = 0.1  # share of the longest motion of a piece below which another one only sets out on the next stroke
+_BEFORE_BEND = 100  # samples of either level that tell where a displacement bends
 _KEPT = 0.9  # share of the load of a stroke that a second motion carries if it belongs to it
 
 
@@ -325,6 +327,56 @@ def level_cuts(values: FloatArray) -> list[Range]:
     """(end of a level, start of the next) wherever a channel goes from one steady level to another."""
     calm = median_of_three(values)
     return [_passage(calm, one, other) for one, other in pairwise(levels_of(values))]
+
+
+def speed_cuts(trace: Trace, drive: DriveMotion, span: Range) -> list[Range]:
+    """(end of a level, start of the next) of the speed of a drive within a range of samples; both are one at a step.
+
+    The slope of a displacement is felt over many samples; the displacement itself says where it bends.
+    """
+    first, last = span
+    cuts = [(first + a, first + b) for a, b in level_cuts(np.abs(drive.pace[first:last]))]
+    if drive.channel != "displacement" or trace.displacement_m is None:
+        return [_drawn_in(cut, drive.width) for cut in cuts]
+    starts, ends = [first, *(b for _, b in cuts)], [*(a for a, _ in cuts), last]
+    return [
+        _bend(trace.time_s, trace.displacement_m, cut, (max(start, cut[0] - _BEFORE_BEND), end), drive.width)
+        for cut, start, end in zip(cuts, starts, ends[1:], strict=False)
+    ]
+
+
+def _drawn_in(cut: Range, width: int) -> Range:
+    """A passage from one level to the next without what a mean over so many samples adds to it."""
+    first, last = cut
+    lasts = math.sqrt(max((last - first) ** 2 - width**2, 0.0))  # the squares of the lengths of ramps and means add up
+    middle, half = (first + last) / 2.0, max(lasts, 1.0) / 2.0
+    start = int(middle - half)
+    return cut if width <= 1 else (start, max(int(middle + half), start + 1))
+
+
+def _bend(time_s: FloatArray, x: FloatArray, cut: Range, span: Range, width: int) -> Range:
+    """The samples between two speeds by the lines through a displacement before and after them.
+
+    The lines meet in the middle of an even ramp; there the displacement lies off them by an eighth of what the speed
+    changes by times the duration of the ramp.
+    """
+    before, after = slice(span[0], cut[0] - width), slice(cut[1] + width, min(span[1], cut[1] + width + _BEFORE_BEND))
+    if min(before.stop - before.start, after.stop - after.start) < MINIMUM_SAMPLES:
+        return _drawn_in(cut, width)
+    (old, t0, x0), (new, t1, x1) = (line(time_s[part], x[part]) for part in (before, after))
+    if old == new:
+        return _drawn_in(cut, width)
+    bends_s = (x1 - x0 + old * t0 - new * t1) / (old - new)
+    at = int(np.searchsorted(time_s, bends_s))
+    if not cut[0] - width <= at <= cut[1] + width:
+        return _drawn_in(cut, width)
+    near = slice(at - 1, at + 2)
+    lines = x0 + old * (time_s[near] - t0), x1 + new * (time_s[near] - t1)
+    away = x[near] - (np.maximum(*lines) if new > old else np.minimum(*lines))
+    half_s = max(4.0 * float(np.mean(away)) / (new - old), 0.0)
+    sample_s = float(time_s[at + 1] - time_s[at - 1]) / 2.0  # so that what happens at once is not lost to the old level
+    start, end = np.searchsorted(time_s, (bends_s - half_s - sample_s / 2.0, bends_s + half_s))
+    return int(start), max(int(end), int(start))
 
 
 def _passage(values: FloatArray, one: tuple[int, int, float], other: tuple[int, int, float]) -> Range:

@@ -28,6 +28,7 @@ from tribo.traces.drive import (
     levels_of,
     quiet_end,
     relaxes_from,
+    speed_cuts,
     standstills,
     stroke_end,
 )
@@ -581,14 +582,12 @@ def _motion(
 ) -> Iterator[_Span]:
     """The phases of one motion of the drive, from its start to its stop."""
     first, last = span
-    cuts = []
-    channels = {"step of load": trace.columns.get("normal_force_N"), "step of speed": drive.pace if drive else None}
+    cuts, load = [], trace.columns.get("normal_force_N")
     moving = first + int(np.argmax(drive.moving[first:last])) if drive is not None and last > first else first
-    for name, values in channels.items():
-        if values is not None and np.isfinite(values[moving:last]).all():
-            cuts += [(moving + a, moving + b, name) for a, b in level_cuts(np.abs(values[moving:last]))]
-            if name == "step of speed" and drive is not None:  # which its smoothing has drawn out
-                cuts[:] = [_drawn_in(cut, drive.width) if cut[2] == name else cut for cut in cuts]
+    if load is not None and np.isfinite(load[moving:last]).all():
+        cuts += [(moving + a, moving + b, "step of load") for a, b in level_cuts(np.abs(load[moving:last]))]
+    if drive is not None and np.isfinite(drive.pace[moving:last]).all():
+        cuts += [(a, max(b, a + 1), "step of speed") for a, b in speed_cuts(trace, drive, (moving, last))]
     cuts.sort()
     cuts = [cut for k, cut in enumerate(cuts) if k == 0 or cut[0] >= cuts[k - 1][1]]
     start = _start_from_rest(signal, (first, cuts[0][0] if cuts else last), starts_s) if from_rest else None
@@ -605,15 +604,6 @@ def _motion(
         yield from _slide(signal, begin, a, evidence, after_peak=k == 0 and start is not None)
         yield _Span(name, a, b, "the load" if name == "step of load" else "the speed")
         begin, evidence = b, f"after the {name}"
-
-
-def _drawn_in(cut: tuple[int, int, str], width: int) -> tuple[int, int, str]:
-    """A passage from one level to the next without what a mean over so many samples adds to it."""
-    first, last, name = cut
-    lasts = math.sqrt(max((last - first) ** 2 - width**2, 0.0))  # the squares of the lengths of ramps and means add up
-    middle, half = (first + last) / 2.0, max(lasts, 1.0) / 2.0
-    start = int(middle - half)
-    return cut if width <= 1 else (start, max(int(middle + half), start + 1), name)
 
 
 def _reversal(signal: Signal, span: Range, at: int) -> Range:

@@ -35,6 +35,8 @@ _ARRIVED = 0.1  # share of the whole change that is left where running-in counts
 _SURE = 0.975  # probability on either side with which a drift is told
 _FEWEST_HOLDS = 3
 _RESOLVED = 5  # samples in which a change at once comes half-way down at the least, so that its size is told
+_BELOW = 3.0  # times the scatter about it by which a sample of the rise lies below the course of the fall
+_SETTLED_BY = 0.6  # share of a level after which it counts as steady at the latest where a step is read
 _ABOVE_NOISE = 1.5  # times the largest departure of the later half by which a force goes beyond both levels at a step
 
 
@@ -65,6 +67,7 @@ class _Level:
     phase: Phase
     begin_s: float
     mean: Interval  # above the zero of the pull, without the uncertainty of that zero
+    late: Interval  # the same where nothing is left of a change, from which steps are counted
 
     @property
     def runs_in(self) -> bool:
@@ -137,7 +140,8 @@ def _levels(part: Part) -> Iterator[_Level]:
             if force.size - settled >= _FEWEST:
                 began = before.start_s if before and before.name in ("running-in", "slip") else phase.start_s
                 level = replace(phase, start_s=float(part.trace.time_s[samples.start + settled]))
-                yield _Level(part, level, began, mean_of_level(force[settled:]))
+                late = min(2 * settled, max(settled, int(_SETTLED_BY * force.size)))
+                yield _Level(part, level, began, mean_of_level(force[settled:]), mean_of_level(force[late:]))
         before = phase
 
 
@@ -175,8 +179,8 @@ def _step(one: _Level, other: _Level) -> Iterator[Reading]:
     of_speed = _differ(one.speed_m_s, other.speed_m_s)
     if not (of_speed or _differ(one.load_N, other.load_N)):
         return
-    total = _about(other.mean[0] - one.mean[0], _half(one.mean), _half(other.mean))
-    values = {"force_N": _about(other.mean[0], _half(other.mean), _of_zero(other.part)), "total_change_N": total}
+    total = _about(other.late[0] - one.late[0], _half(one.late), _half(other.late))
+    values = {"force_N": _about(other.late[0], _half(other.late), _of_zero(other.part)), "total_change_N": total}
     direct = _direct(one, other) if of_speed else None
     if direct is not None:
         values["direct_change_N"] = direct
@@ -192,9 +196,9 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
 
     By an exponential through the force from its extreme on, over six times the time in which it comes half-way down.
     """
-    samples = other.part.between(max(other.begin_s, one.phase.end_s), other.phase.end_s)
+    samples = other.part.between(one.phase.end_s, other.phase.end_s)
     force = other.part.trace.force_N[samples] - other.part.pull.zero_N
-    old, new = one.mean[0], other.mean[0]
+    old, new = one.late[0], other.late[0]
     calm = median_of_three(force[: force.size // 2]) if force.size >= 4 * _FEWEST else force[:0]
     if not calm.size:
         return None
@@ -202,7 +206,8 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
     below = float(beyond[0].min()), float(beyond[1].min())
     upward = below[0] < below[1]
     height = (calm - new) if upward else (new - calm)
-    at = int(np.argmax(height))
+    at = max(int(np.argmax(height)) - 1, 0)
+    at += int(np.argmax(force[at : at + 3] if upward else -force[at : at + 3]))  # the median is blind to an end
     late = median_of_three(force[force.size // 2 :])
     if -min(below) < _ABOVE_NOISE * float(np.abs(late - np.median(late)).max()) or height[at] <= 0:
         return None
@@ -211,24 +216,26 @@ def _direct(one: _Level, other: _Level) -> Interval | None:
     part = force[at : at + 6 * half]
     if half < _RESOLVED or part.size < 2 * _FEWEST:
         return None
-    along = np.arange(part.size, dtype=float)
-    fits = []
+    along, mean, fits = np.arange(part.size, dtype=float), float(part.mean()), []
     for tau in np.geomspace(0.3 * half, 6.0 * half, 60):
-        design = np.column_stack((np.ones(part.size), np.exp(-along / tau)))
-        best, *_ = np.linalg.lstsq(design, part, rcond=None)
-        # the extreme lies where the rise first meets the course of the fall
-        before = best[0] + best[1] * np.exp((at - np.arange(at + 1.0)) / tau)
-        beyond_it = (calm[: at + 1] - before) if upward else (before - calm[: at + 1])
-        meets = int(np.argmax(np.append(beyond_it[:at] >= 0, True)))
-        fits.append((float(((part - design @ best) ** 2).sum()), float(before[meets]), design))
-    squares, top, design = min(fits, key=lambda fit: fit[0])
-    variance, _ = variance_of_slow(part - design @ np.linalg.lstsq(design, part, rcond=None)[0], 3, _COSINES_OF_STEP)
-    variance = max(variance, squares / (part.size - 3))
-    near = [value for other, value, _ in fits if other <= squares + 4.0 * variance]
-    leverage = float(np.linalg.pinv(design.T @ design).sum())
+        decay = np.exp(-along / tau)
+        centre, away = float(decay.mean()), decay - decay.mean()
+        spread = float(away @ away)
+        change = float(away @ part) / spread
+        rest = part - mean - change * away
+        squares = float(rest @ rest)
+        # the extreme lies where the rise has met the course of the fall, after the last sample that is clearly below it
+        before = mean + change * (np.exp((at - np.arange(at + 1.0)) / tau) - centre)
+        below_it = (before - force[: at + 1]) if upward else (force[: at + 1] - before)
+        clearly = np.flatnonzero(below_it[:at] > _BELOW * math.sqrt(squares / part.size))
+        top = float(before[int(clearly[-1]) + 1 if clearly.size else 0])
+        fits.append((squares, top, 1.0 / part.size + (1.0 - centre) ** 2 / spread, rest))
+    squares, top, leverage, rest = min(fits, key=lambda fit: fit[0])
+    variance = max(variance_of_slow(rest, 3, _COSINES_OF_STEP)[0], squares / (part.size - 3))
+    near = [value for other, value, *_ in fits if other <= squares + 4.0 * variance]
     placed = squares / (part.size - 3)  # the noise of a sample says which one is the extreme
     u = math.sqrt(variance * leverage + ((max(near) - min(near)) / 4.0) ** 2 + placed)
-    return _about(top - old, 2.2 * u, _half(one.mean))
+    return _about(top - old, 2.2 * u, _half(one.late))
 
 
 @dataclass(frozen=True)
@@ -417,8 +424,11 @@ def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Inter
         squares = ((force - level[:, None] - change[:, None] * decay) ** 2).sum(axis=1)
         best = int(np.argmin(squares))
         rest = force - level[best] - change[best] * decay[best]
-        variance, dof = variance_of_slow(rest, 3, _COSINES_OF_ALL)
-        bound = variance * float(f_distribution.ppf(0.95, 1, dof))
+        along = time_s / taus[best]
+        design = np.column_stack((np.ones(n), decay[best], along * decay[best]))
+        variance, dof = variance_of_slow(rest, 3, _COSINES_OF_ALL, design)
+        uneven = _unevenness(design, rest)
+        bound = variance * uneven * float(f_distribution.ppf(0.95, 1, dof))
         near = np.flatnonzero(squares <= squares[best] + bound)
         low, high = float(taus[max(near[0] - 1, 0)]), float(taus[min(near[-1] + 1, taus.size - 1)])
     if float(((force - force.mean()) ** 2).sum() - squares[best]) < 3.0 * bound:
@@ -428,6 +438,18 @@ def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Inter
     u = math.sqrt(variance / n) * of_student(dof)
     steady = float(level[best]), float(level[near].min()) - u, float(level[near].max()) + u
     return steady, (took * float(taus[best]), took * float(taus[near[0]]), took * float(taus[near[-1]])), float(left)
+
+
+def _unevenness(design: FloatArray, rest: FloatArray) -> float:
+    """How much more the noise weighs on a time constant than even noise of its size: it is larger where the force is.
+
+    The ratio of the variances of the last parameter of ``design`` (n, parameters) by the residuals where they are, each
+    as if its sample had not been fitted (MacKinnon and White 1985, J. Econometrics 29, 305), and by their mean square;
+    one at the least.
+    """
+    weights = np.linalg.pinv(design)
+    free = rest / (1.0 - np.einsum("ij,ji->i", design, weights))
+    return max(float(weights[2] ** 2 @ free**2) / float(weights[2] @ weights[2]) / float(rest @ rest) * rest.size, 1.0)
 
 
 def _holds(part: Part) -> list[Reading]:

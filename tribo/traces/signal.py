@@ -217,12 +217,18 @@ def mean_of_level(values: FloatArray) -> tuple[float, float, float]:
     return mean, mean - half, mean + half
 
 
-def variance_of_slow(rest: FloatArray, first: int, count: int) -> tuple[float, int]:
+def variance_of_slow(
+    rest: FloatArray, first: int, count: int, fitted: FloatArray | None = None
+) -> tuple[float, int]:
     """Variance of slow noise per sample by ``count`` cosine coefficients from ``first`` on of residuals, and their
-    number, which is smaller where samples are few."""
+    number, which is smaller where samples are few.
+
+    ``fitted`` (n, parameters) is what was fitted: its share of these coefficients is no longer in the residuals.
+    """
     cosines = min(count, rest.size // 4)
-    coefficients = _cosines(rest.size, first, cosines) @ rest
-    return float((coefficients**2).mean()), cosines
+    basis = _cosines(rest.size, first, cosines)
+    lost = 0.0 if fitted is None else float(((basis @ np.linalg.qr(fitted)[0]) ** 2).sum())
+    return float(((basis @ rest) ** 2).sum()) / max(cosines - lost, 1.0), max(cosines - math.ceil(lost), 1)
 
 
 @lru_cache(maxsize=64)
