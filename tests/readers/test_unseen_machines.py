@@ -116,3 +116,53 @@ def test_records_side_by_side_are_not_proposed_for_columns_of_other_units(tmp_pa
 def test_a_row_of_bracketed_units_is_shown_without_further_brackets(tmp_path: Path) -> None:
     path = saved(tmp_path, "Time\tForce\tHeater\n[s]\t[N]\t[W]", TIME, FRICTION, TIME)
     assert '"Heater" [W]\n' in inspect_export(path).in_words()
+
+
+@pytest.mark.parametrize("varies", [False, True])
+def test_the_stroke_of_an_oscillating_machine_is_no_path(tmp_path: Path, varies: bool) -> None:
+    stroke = 1.0 + (np.sin(TIME) if varies else 1e-3 * np.sin(TIME))
+    header = "Time [s]\tCOF\tLoad [N]\tFrequency [Hz]\tStroke [mm]"
+    trace = read_export(saved(tmp_path, header, TIME, 0.1 * FRICTION, np.full(N, 50.0), np.full(N, 25.0), stroke))
+    assert (trace.displacement_m is not None) == varies
+
+
+@pytest.mark.parametrize(("path_mm", "is_path"), [(0.02, False), (600.0, True)])
+def test_the_wear_of_a_pin_that_is_called_displacement_is_no_path(
+    tmp_path: Path, path_mm: float, is_path: bool
+) -> None:
+    header = "Time [s];Friction force [N];Displacement [mm];Rotational speed [rpm]"
+    path = saved(tmp_path, header, TIME, FRICTION, path_mm * TIME / TIME[-1], np.full(N, 200.0))
+    assert (read_export(path).displacement_m is not None) == is_path
+    assert ("it is far shorter than the path by the rotation speed" in inspect_export(path).in_words()) != is_path
+
+
+def test_a_displacement_of_micrometres_beside_a_sliding_speed_is_no_path(tmp_path: Path) -> None:
+    header = "Time [s];Friction force [N];Displacement [um];Sliding speed [m/s]"
+    assert read_export(saved(tmp_path, header, TIME, FRICTION, TIME, np.full(N, 0.1))).displacement_m is None
+
+
+def test_a_pull_that_breaks_is_not_called_negative_for_what_follows(tmp_path: Path) -> None:
+    force = np.where(TIME < 2.0, 40.0 * TIME, -0.5)
+    assert inspect_export(saved(tmp_path, "Time [s],Force [N]", TIME, force)).signs == ()
+
+
+def test_the_channels_of_a_kyowa_logger_have_the_units_above_them(tmp_path: Path) -> None:
+    header = '"ID番号","PCD-400A"\n"測定CH数",2\n"CH名称"\n"レンジ","5kμε","2kμε"\n"校正係数",3.1,0.4\n'
+    path = saved(
+        tmp_path, header + '"単位","g","N"\n"Time(sec)","CH1","CH2"', TIME, 500 * FRICTION, FRICTION, encoding="cp932"
+    )
+    assert 'normal_force = "CH1"' in refusal(path)
+    trace = read_export(path, columns={"normal_force": "CH1", "friction_force": "CH2"})
+    np.testing.assert_allclose(trace.force_N, FRICTION, rtol=1e-5)
+    np.testing.assert_allclose(trace.columns["normal_force_N"], 500 * 9.80665e-3 * FRICTION, rtol=1e-5)
+
+
+@pytest.mark.parametrize("line", ["{:.4f}", "Kraft: {:.4f} N", "run=1, F = {:.4f} N; T: 21.5 C"])
+def test_the_serial_monitor_of_a_board_is_a_table_with_its_clock(tmp_path: Path, line: str) -> None:
+    clock = [f"09:02:{t:06.3f} -> " for t in TIME]
+    printed = [clock[0] + "tare done", *(c + line.format(f) for c, f in zip(clock, FRICTION, strict=True))]
+    (tmp_path / "a.txt").write_text("\n".join(printed), encoding="utf-8")
+    columns = {"friction_force": "value 1 [N]"} if line == "{:.4f}" else {}
+    trace = read_export(tmp_path / "a.txt", columns=columns)
+    np.testing.assert_allclose(trace.force_N, FRICTION, atol=1e-4)
+    np.testing.assert_allclose(trace.time_s, TIME, atol=1e-6)

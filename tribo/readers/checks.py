@@ -7,6 +7,7 @@ corrected one. Damage is a time that decreases or has gaps, and values off by a 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -26,6 +27,10 @@ _FORCES_OF_NO_KIND = {
     "力", "試験力", "힘",
 }  # fmt: skip
 _PATH_FOR_TIME_M_S = 1e-3  # 1 mm of path counts as 1 s where neither time nor speed is known
+_STROKES = {"stroke", "hub", "course", "corsa", "curso", "amplitude", "行程", "ストローク", "ход"}
+_SAYS_FREQUENCY = re.compile(r"\bfreq|frequenz|frecuencia|czestotliwosc|频率|周波数|частота")
+_SHORTEST_TURN_M = 5e-4  # the track of a pin on a disc is longer
+_SHARE_OF_PATH = 0.01  # of speed times time
 GAP_STEPS = 5.0  # a time step this many median steps long is a gap
 _WORTH_A_LOOK = 1.5  # mean steps: where no step is this long, none is a gap
 _TEN_TIMES = (9.0, 11.0)  # a decimal mark slipped by one place, noise allowed for
@@ -198,6 +203,27 @@ def beyond_measurement(
             what = "no value of this column is large enough to have been measured"
             problems.append(Problem("impossible_number", what, file, None, column, found, allowed))
     return problems
+
+
+def why_no_path(arrays: Mapping[str, FloatArray], columns: Sequence[Column], names: Sequence[str]) -> str:
+    """Why a column that is named as a displacement is none; "" where it may be one, or was asked for.
+
+    Machines that oscillate write their stroke, its amplitude, beside the frequency; discs that turn write the wear of
+    a pin as a displacement, which is shorter than any track of so many turns.
+    """
+    it = next((c for c in columns if c.quantity == "displacement"), None)
+    time_follows = any(c.quantity == "time" and c.index < 0 for c in columns)  # from the path itself
+    if it is None or not it.reason.startswith("named") or time_follows:
+        return ""
+    path, time = arrays["displacement"], arrays["time"]
+    oscillates = plain_name(it.label) in _STROKES and any(map(_SAYS_FREQUENCY.search, map(plain_name, names)))
+    if oscillates and np.quantile(np.abs(path), 0.1) > 0.5 * np.abs(path).max():
+        return "it is the stroke of an oscillation, no displacement"
+    moved, steps = float(np.abs(np.diff(path)).sum()), np.abs(np.diff(time))
+    for quantity, least_m in (("rotation speed", _SHORTEST_TURN_M), ("speed", _SHARE_OF_PATH)):
+        if quantity in arrays and moved < least_m * float((np.abs(arrays[quantity][1:]) * steps).sum()):
+            return f"it is far shorter than the path by the {quantity}, so it is no displacement along it"
+    return ""
 
 
 def spread_over_ticks(time: FloatArray, file: str, column: str, row_of: RowOf) -> tuple[FloatArray, list[Problem]]:

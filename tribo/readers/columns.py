@@ -401,6 +401,8 @@ def by_a_word(name: str, unit: str) -> tuple[str, int] | None:
 def _by_its_unit(names: Sequence[str], units: Sequence[str], index: int, hit: tuple[str, int]) -> tuple[str, int]:
     """What a column is where its unit, or the lack of one, tells more than its name."""
     unit = _unit_of(names, units, index)
+    if hit[0] == "time" and is_unit(unit, "temperature"):  # T [°C]
+        return "temperature", len(QUANTITIES["temperature"].aliases)
     if hit[0] == "speed" and turns_a_time(unit):
         return "rotation speed", hit[1]
     if hit[0] == "rotation speed" and unit and not turns_a_time(unit) and is_unit(unit, "speed"):

@@ -289,7 +289,7 @@ def _signs(parts: list[ReadTable]) -> tuple[str, ...]:
     means = [float(np.mean(part.arrays["friction force"][part.arrays["time"].size // 2 :])) for part in parts]
     if max(means) > 0 > min(means):
         found.append("the friction force changes sign between tables: strokes in opposite directions")
-    elif max(means) < 0:
+    elif max(means) < 0 and all(-f.min() > f.max() for part in parts for f in [part.arrays["friction force"]]):
         found.append("the friction force is negative")
     return tuple(found)
 

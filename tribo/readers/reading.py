@@ -21,6 +21,7 @@ from tribo.readers.checks import (
     check_time,
     complete,
     spread_over_ticks,
+    why_no_path,
 )
 from tribo.readers.clocks import by_the_clock
 from tribo.readers.columns import (
@@ -376,6 +377,11 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
         return why
     if impossible:
         return ReadError(impossible)
+    if no_path := why_no_path(arrays, columns, layout.names):
+        del arrays["displacement"]
+        (it,) = (c for c in columns if c.quantity == "displacement")
+        columns = tuple(c for c in columns if c is not it)
+        passed_over[it.index] = no_path
     arrays["time"], coarse = spread_over_ticks(arrays["time"], source.file, labels["time"], row_of)
     findings = coarse + check_time(arrays["time"], source.file, labels["time"], row_of)
     load = arrays.get("normal force")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -270,6 +271,49 @@ def _damper_unit(name: str, above: Mapping[str, Any]) -> str:
     return str(above.get(f"{name.rstrip(' 12')} units", ""))
 
 
+# Kyowa PCD loggers: quoted keys of channels, their units in the row 単位, channels that have numbers only.
+def _kyowa_as_table(source: Source) -> Source:
+    """The names of channels and their units from the rows above, in the row of names."""
+    lines = source.text(bytes(source.data)).split("\n")
+    above = {cells[0]: cells[1:] for line in lines[:40] if (cells := cut(line.strip(), ","))}
+    for k, line in enumerate(lines[:40]):
+        time, *channels = cut(line.strip(), ",")
+        if not time.startswith("Time"):
+            continue
+        called, units = ([*above.get(key, []), *[""] * len(channels)] for key in ("CH名称", "単位"))
+        named = [called[j] or channel for j, channel in enumerate(channels)]
+        lines[k] = ",".join([time, *(f"{name} [{unit}]" for name, unit in zip(named, units, strict=False))])
+        break
+    return replace(source, data="\n".join(lines).encode(source.codec, errors="replace"))
+
+
+# The monitor of an Arduino: a clock and an arrow before what the program of the board prints, numbers in one order or
+# behind their names ("F: 1.2 N").
+_MONITOR_LINE = re.compile(r"(\d{1,2}:\d\d:\d\d\.\d{3}) -> (.*)")
+_PRINTED = re.compile(
+    r"(?:([^\W\d][^:=,;\t]*?)\s*[:=]\s*)?([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"  # name: number
+    r"(?:\s*([^\W\d_][\w/]*)(?![\w/]*\s*[:=]))?[\s,;]*"  # its unit
+)
+
+
+def _monitor_as_table(source: Source) -> Source:
+    """The clock and the numbers of every line that has as many as most have."""
+    rows = []
+    for line in source.text(bytes(source.data)).split("\n"):
+        found = _MONITOR_LINE.fullmatch(line.strip())
+        printed = list(_PRINTED.finditer(found[2])) if found else []
+        if found and printed and "".join(p[0] for p in printed) == found[2]:
+            rows.append((found[1], printed))
+    width = Counter(len(printed) for _, printed in rows).most_common(1)
+    whole = [(clock, printed) for clock, printed in rows if len(printed) == width[0][0]]
+    if len(whole) < 2:
+        return source
+    called = [(p[1] or f"value {k}") + (f" [{p[3]}]" if p[3] else "") for k, p in enumerate(whole[0][1], start=1)]
+    table = ["\t".join(["Clock", *called]), *("\t".join([clock, *(p[2] for p in printed)]) for clock, printed in whole)]
+    data = ("\n".join(table) + "\n").encode(source.codec, errors="replace")
+    return replace(source, data=data, machine="monitor")
+
+
 # Tried in this order; the last one accepts everything the others do not recognise.
 TEXT_MACHINES = (
     Machine(
@@ -336,6 +380,20 @@ TEXT_MACHINES = (
         "JSON with columns or rows of numbers",
         lambda source: source.machine == "json" or source.head_text.lstrip()[:1] in ("{", "["),
         as_table=_json_as_table,
+    ),
+    Machine(
+        "kyowa",
+        "Kyowa PCD logger, numbered channels",
+        _begins('"ID番号","PCD-'),
+        advice='the channels have numbers only; say what they measure: normal_force = "CH1", friction_force = "CH2" in '
+        "columns",
+        as_table=_kyowa_as_table,
+    ),
+    Machine(
+        "monitor",
+        "serial monitor of an Arduino, a clock before every line",
+        lambda source: sum(bool(_MONITOR_LINE.fullmatch(line.strip())) for line in source.head[:20]) > 2,
+        as_table=_monitor_as_table,
     ),
     Machine("rtec", "Rtec and similar, one table per step, columns in any order", _is_rtec, _rtec_hints),
     Machine("delimited", "plain delimited table with column names and units", lambda source: True),
