@@ -91,7 +91,8 @@ def in_short(value: Any) -> str:
     if isinstance(value, str):
         return _cut(value)
     if hasattr(type(value), "columns") and hasattr(type(value), "index"):
-        return _cut(f"table of {_count(len(value.index), 'row')}: {', '.join(map(str, value.columns))}")
+        n = len(value.index)
+        return _cut(f"table of {n} row{'' if n == 1 else 's'}: {', '.join(map(str, value.columns))}")
     if hasattr(value, "shape") and hasattr(value, "dtype"):
         return _array_in_short(value)
     if isinstance(value, Mapping):
@@ -138,7 +139,10 @@ def _array_in_short(value: Any) -> str:
     if value.size == 0:
         return ""
     if value.size <= MOST_NAMED:
-        return _cut(str(value.tolist()) if value.dtype.kind != "f" else _few(value))
+        if value.dtype.kind != "f":
+            return _cut(str(value.tolist()))
+        as_shape = f" as {value.shape}" if value.ndim > 1 else ""
+        return _cut("[" + ", ".join(f"{v:.5g}" for v in value.ravel()) + "]" + as_shape)
     shape = " x ".join(map(str, value.shape))
     if value.dtype.kind not in "iuf":
         return _cut(f"array of {shape}, from {value.ravel()[0]!s} to {value.ravel()[-1]!s}")
@@ -147,12 +151,6 @@ def _array_in_short(value: Any) -> str:
     return f"array of {shape}{reach}"
 
 
-def _few(value: Any) -> str:
-    return "[" + ", ".join(f"{v:.5g}" for v in value.ravel()) + "]" + (f" as {value.shape}" if value.ndim > 1 else "")
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}" + ("" if n == 1 else "s")
 
 
 def _cut(text: str, most: int = MOST_LETTERS) -> str:

@@ -13,7 +13,7 @@ from tribo.display import displayed
 _LOG = logging.getLogger("tribo")
 _QUESTION = "did you mean"
 LONGEST_FOUND = 2000  # characters of what was found that a problem holds
-_OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
+OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
 
 
 def _without_middle(text: str) -> str:
@@ -146,7 +146,7 @@ def system_problem(why: OSError, file: str | None = None) -> Problem:
     if of_many:  # shutil.Error: one (source, target, cause) for each file
         _, place, cause = (str(part) for part in why.args[0][0])
     damaged = why.errno is None and not of_many  # libraries say so of contents
-    return Problem("unreadable" if damaged else _OF_THE_SYSTEM, cause[:1].lower() + cause[1:], file=place)
+    return Problem("unreadable" if damaged else OF_THE_SYSTEM, cause[:1].lower() + cause[1:], file=place)
 
 
 def unexpected(why: Exception, what: str, file: str | None = None) -> Problem:
@@ -164,11 +164,6 @@ def unexpected(why: Exception, what: str, file: str | None = None) -> Problem:
     return Problem("unexpected", f"{what} because of an error in tribo ({detail})", file=file)
 
 
-def of_the_system(problem: Problem) -> Problem:
-    """The same problem as one of the machine and not of the input."""
-    return replace(problem, kind=_OF_THE_SYSTEM)
-
-
 def is_of_the_system(kind: str) -> bool:
     """Whether a problem of this kind is one of the machine and not of the input."""
-    return kind in (_OF_THE_SYSTEM, "out_of_memory")
+    return kind in (OF_THE_SYSTEM, "out_of_memory")

@@ -1028,6 +1028,75 @@ class Study:
         return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
 
 
+Weights = Literal["relative", "ratio", "force", "repeats"]
+
+
+@displayed()
+@dataclass(frozen=True)
+class StudyOptions:
+    """Options of a study; each is recorded with the results.
+
+    Parameters
+    ----------
+    rule : str
+        How static and sliding friction are read from a trace, a name in ``tribo.traces.RULES``.
+    weights : "relative", "ratio", "force" or "repeats"
+        Which scatter is taken as constant over the loads; see :func:`tribo.fit`.
+    zero, load_zero : str
+        Zero of the force and of the recorded normal load, for tests without their own: "before contact", "at rest",
+        "none", a number in N, or "[from, to]" in s.
+    no_model : bool
+        Leave the spring-block model out.
+    flat : str
+        The sample that calibrates the model; empty: F, or the only flat sample.
+    runs : int
+        Simulations per sample and load.
+    seed : int
+        Seed of all random numbers.
+    jobs : int
+        Processes at once; no result depends on it.
+    laws : Path, optional
+        Folder with laws of earlier campaigns.
+    overrides : Path, optional
+        Table of decisions made by hand about single pulls.
+    kept : Path, optional
+        Folder of finished simulations and diagnosis, used again by the next start.
+    scheduler : str, optional
+        Address of a dask scheduler that runs the simulations.
+    trace_law : str, optional
+        Law to read from whole traces, "auto" or a name in ``tribo.tracelaws``.
+
+    Examples
+    --------
+    >>> options = tribo.StudyOptions(rule="astm_d1894", no_model=True)
+    >>> study = tribo.study(tribo.load_campaign(tribo.data_dir() / "example"), options, until="ingest")
+    >>> study.ingested.pulls["T001"].rule
+    'astm_d1894'
+    """
+
+    rule: str = "first_peak"
+    weights: Weights = "relative"
+    zero: str = ""
+    load_zero: str = ""
+    no_model: bool = False
+    flat: str = ""
+    runs: int = 4
+    seed: int = 0
+    jobs: int = 2
+    laws: Path | None = None
+    overrides: Path | None = None
+    kept: Path | None = None
+    scheduler: str | None = None
+    trace_law: str | None = None
+
+    def as_words(self) -> dict[str, str]:
+        """The options as text, for the provenance."""
+        laws = {"laws": str(self.laws)} if self.laws is not None else {}
+        zeros = {name: text for name, text in (("zero", self.zero), ("load_zero", self.load_zero)) if text}
+        laws |= {"trace_law": self.trace_law} if self.trace_law else {}
+        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros, **laws}
+
+
 __all__ = [
     "CLOSED_TRACK_M",
     "PA_PER_KPA",
@@ -1061,6 +1130,8 @@ __all__ = [
     "Slip",
     "SlipChange",
     "Study",
+    "StudyOptions",
     "Test",
     "Trace",
+    "Weights",
 ]

@@ -5,14 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
-from tribo.display import displayed
 from tribo.errors import FitError, SimulationError
 from tribo.kept_results import kept_or_made
 from tribo.records import (
@@ -25,18 +24,19 @@ from tribo.records import (
     Pull,
     Run,
     Study,
+    StudyOptions as StudyOptions,
     Trace,
+    Weights,
 )
 from tribo.zeroing import DEFAULT as AUTOMATIC_ZERO
 
 if TYPE_CHECKING:
-    from tribo.comparison.prediction import Cell, ModelRuns
+    from tribo.comparison.prediction import Cell
     from tribo.diagnostics import Diagnosis
     from tribo.diagnostics.diagnosis import DiagnosisWithoutModel
     from tribo.diagnostics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
-Weights = Literal["relative", "ratio", "force", "repeats"]
 Until = Literal["ingest", "fit", "compare", "report"]
 DIAGNOSED_BY = (
     "diagnostics", "lawsearch", "mechanisms", "mechanisms_in_model", "fitting", "laws", "springblock", "records",
@@ -47,79 +47,6 @@ ASSESSED_BY = ("fitting", "laws", "records", "fits", "vocabulary")
 
 def _silent(stage: str, done: int, total: int) -> None:
     """Report nothing."""
-
-
-@displayed()
-@dataclass(frozen=True)
-class StudyOptions:
-    """Options of a study; each is recorded with the results.
-
-    Parameters
-    ----------
-    rule : str
-        How static and sliding friction are read from a trace, a name in ``tribo.traces.RULES``.
-    weights : "relative", "ratio", "force" or "repeats"
-        Which scatter is taken as constant over the loads; see :func:`tribo.fit`.
-    zero, load_zero : str
-        Zero of the force and of the recorded normal load, for tests without their own: "before contact", "at rest",
-        "none", a number in N, or "[from, to]" in s.
-    no_model : bool
-        Leave the spring-block model out.
-    flat : str
-        The sample that calibrates the model; empty: F, or the only flat sample.
-    runs : int
-        Simulations per sample and load.
-    seed : int
-        Seed of all random numbers.
-    jobs : int
-        Processes at once; no result depends on it.
-    laws : Path, optional
-        Folder with laws of earlier campaigns.
-    overrides : Path, optional
-        Table of decisions made by hand about single pulls.
-    kept : Path, optional
-        Folder of finished simulations and diagnosis, used again by the next start.
-    scheduler : str, optional
-        Address of a dask scheduler that runs the simulations.
-    trace_law : str, optional
-        Law to read from whole traces, "auto" or a name in ``tribo.tracelaws``.
-
-    Examples
-    --------
-    >>> options = tribo.StudyOptions(rule="astm_d1894", no_model=True)
-    >>> study = tribo.study(tribo.load_campaign(tribo.data_dir() / "example"), options, until="ingest")
-    >>> study.ingested.pulls["T001"].rule
-    'astm_d1894'
-    """
-
-    rule: str = "first_peak"
-    weights: Weights = "relative"
-    zero: str = ""
-    load_zero: str = ""
-    no_model: bool = False
-    flat: str = ""
-    runs: int = 4
-    seed: int = 0
-    jobs: int = 2
-    laws: Path | None = None
-    overrides: Path | None = None
-    kept: Path | None = None
-    scheduler: str | None = None
-    trace_law: str | None = None
-
-    @property
-    def model_runs(self) -> ModelRuns:
-        """How the model is run."""
-        from tribo.comparison.prediction import ModelRuns
-
-        return ModelRuns(self.runs, self.seed, self.jobs, self.kept, self.scheduler)
-
-    def as_words(self) -> dict[str, str]:
-        """The options as text, for the provenance."""
-        laws = {"laws": str(self.laws)} if self.laws is not None else {}
-        zeros = {name: text for name, text in (("zero", self.zero), ("load_zero", self.load_zero)) if text}
-        laws |= {"trace_law": self.trace_law} if self.trace_law else {}
-        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros, **laws}
 
 
 DEFAULTS = StudyOptions()
@@ -238,7 +165,7 @@ def simulate_cells(
 
     campaign = with_flat_sample(ingested.campaign, options.flat)
     flat = required_flat_sample(campaign)
-    return run_named_cells(campaign, _alone(fits), flat, options.model_runs, only, progress)
+    return run_named_cells(campaign, _alone(fits), flat, options, only, progress)
 
 
 def compare(
@@ -289,11 +216,9 @@ def compare(
     campaign = with_flat_sample(ingested.campaign, options.flat)
     ingested = replace(ingested, campaign=campaign)
     flat = required_flat_sample(campaign)
-    alone, model = _alone(fits), options.model_runs
-    calibrated = calibrated_cells(campaign, alone, flat, model, progress)
-    comparison, simulated, example_runs = predict(
-        ingested, alone, flat, calibrated, model, weights=options.weights, progress=progress
-    )
+    alone = _alone(fits)
+    calibrated = calibrated_cells(campaign, alone, flat, options, progress)
+    comparison, simulated, example_runs = predict(ingested, alone, flat, calibrated, options, progress)
     return Study(
         ingested, fits, comparison=comparison, simulated=simulated, example_runs=example_runs,
         recorded_runs=_as_recorded(ingested, example_runs, flat, options.rule),

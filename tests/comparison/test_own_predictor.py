@@ -14,7 +14,7 @@ from diagnose.synthetic import PATTERNS
 from tribo.comparison.prediction import cells_of, kept_runs, run_cells
 from tribo.diagnostics import tabled_predictor
 from tribo.kept_results import DamagedResultWarning
-from tribo.records import Campaign, Test
+from tribo.records import Campaign, StudyOptions, Test
 from tribo.springblock import LocalFriction, SimConfig, stratified_design
 from tribo.stages import own_predictor
 
@@ -34,7 +34,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("kept")
     pressures = [n / AREA_M2 for n in (0.2, 1.2)]
     base = SimConfig(friction=FRICTION)
-    run_cells(cells_of(stratified_design(campaign().samples, pressures, 2, 0, base)), folder)
+    run_cells(cells_of(stratified_design(campaign().samples, pressures, 2, 0, base)), StudyOptions(kept=folder))
     return folder
 
 

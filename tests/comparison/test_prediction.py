@@ -16,7 +16,6 @@ from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.comparison.prediction import (
     MOST_LOADS,
-    ModelRuns,
     calibrated_cells,
     load_means,
     loads_to_simulate,
@@ -52,9 +51,9 @@ def run(fitted: Fitted, kept: Path, **options: Any) -> tuple[pd.DataFrame, tuple
         if stage.startswith("calibrating"):
             computed.add("calibration")
 
-    model = ModelRuns(runs=2, kept=kept, **options)
-    calibrated = calibrated_cells(ingested.campaign, fits, "F", model, progress)
-    _, table, examples = predict(ingested, fits, "F", calibrated, model, progress=progress)
+    chosen = stages.StudyOptions(runs=2, kept=kept, **options)
+    calibrated = calibrated_cells(ingested.campaign, fits, "F", chosen, progress)
+    _, table, examples = predict(ingested, fits, "F", calibrated, chosen, progress)
     computed |= {name for name, content in contents(kept).items() if before.get(name) != content}
     return table, examples, computed
 
@@ -140,7 +139,7 @@ def test_the_flat_law_is_all_the_model_sees_of_the_measurement(fitted: Fitted, f
 def test_a_campaign_without_a_flat_law_is_refused(fitted: Fitted) -> None:
     ingested, fits = fitted
     with pytest.raises(FitError, match="flat sample F"):
-        calibrated_cells(ingested.campaign, tuple(f for f in fits if f.sample != "F"), "F")
+        calibrated_cells(ingested.campaign, tuple(f for f in fits if f.sample != "F"), "F", stages.StudyOptions())
 
 
 def test_many_loads_are_thinned_over_their_whole_range(small_campaign: Path) -> None:

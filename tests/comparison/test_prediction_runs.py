@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tribo.comparison.prediction import Cell, cell_name, cells_of, remove_other_runs, run_cells
+from tribo.records import StudyOptions
 from tribo.springblock import SimConfig
 
 DESIGN = [
@@ -28,9 +29,9 @@ def test_cells_are_named_by_sample_and_pressure_and_keep_the_order(cells: tuple[
 
 
 def test_one_after_the_other_side_by_side_and_unkept_are_the_same(cells: tuple[Cell, ...], tmp_path: Path) -> None:
-    alone = run_cells(cells, tmp_path / "a", jobs=1)
-    together = run_cells(cells, tmp_path / "b", jobs=6)
-    unkept = run_cells(cells)
+    alone = run_cells(cells, StudyOptions(kept=tmp_path / "a", jobs=1))
+    together = run_cells(cells, StudyOptions(kept=tmp_path / "b", jobs=6))
+    unkept = run_cells(cells, StudyOptions())
     columns = ["sample", "pressure_Pa", "seed", "static_friction", "sliding_friction"]
     assert alone.equals(together)
     assert alone[columns].equals(unkept[columns])
@@ -38,7 +39,7 @@ def test_one_after_the_other_side_by_side_and_unkept_are_the_same(cells: tuple[C
 
 def test_progress_counts_every_run_up_to_all(cells: tuple[Cell, ...], tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
-    run_cells(cells, tmp_path, jobs=2, progress=lambda done, total: seen.append((done, total)))
+    run_cells(cells, StudyOptions(kept=tmp_path), lambda done, total: seen.append((done, total)))
     assert seen[0] == (0, 8)
     assert seen[-1] == (8, 8)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
@@ -46,8 +47,8 @@ def test_progress_counts_every_run_up_to_all(cells: tuple[Cell, ...], tmp_path: 
 
 def test_other_seeds_have_other_files_and_those_of_others_are_removed(cells: tuple[Cell, ...], tmp_path: Path) -> None:
     others = cells_of([config.with_(seed=config.seed + 10) for config in DESIGN[:2]])
-    run_cells(cells, tmp_path)
-    run_cells(others, tmp_path)
+    run_cells(cells, StudyOptions(kept=tmp_path))
+    run_cells(others, StudyOptions(kept=tmp_path))
     assert len(list(tmp_path.glob("*.nc"))) == 5
     remove_other_runs(cells, tmp_path)
     assert sorted(tmp_path.glob("*.nc")) == sorted(c.path(tmp_path) for c in cells)
@@ -55,8 +56,8 @@ def test_other_seeds_have_other_files_and_those_of_others_are_removed(cells: tup
 
 def test_a_cluster_gives_the_bits_of_threads(cells: tuple[Cell, ...], tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    here = run_cells(cells, tmp_path / "here", jobs=2)
+    here = run_cells(cells, StudyOptions(kept=tmp_path / "here"))
     options = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": "127.0.0.1:0"}
     with distributed.LocalCluster(**options) as cluster:
-        away = run_cells(cells, tmp_path / "away", scheduler=cluster.scheduler_address)
+        away = run_cells(cells, StudyOptions(kept=tmp_path / "away", scheduler=cluster.scheduler_address))
     assert here.equals(away)

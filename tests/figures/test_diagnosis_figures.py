@@ -131,7 +131,7 @@ def test_the_heat_map_marks_a_mean_that_the_verdict_tells_beside_its_causes(noth
     left = tuple(Misfit("sliding", sample, "sample", size, 0.003) for sample, size in (("F", -8.1), ("B", 23.2)))
     cells = misfit_numbers(replace(nothing, verdict=replace(nothing.verdict, verdict="partly", misfits=left)))
     marked = cells[(cells["covariate"] == "mean") & (cells["mark"] != "")].set_index(["row", "observable"])
-    assert dict(marked["effect_percent"]) == {("F", "sliding"): -8.1, ("B", "sliding"): 23.2}
+    assert dict(marked["effect_percent"]) == pytest.approx({("F", "sliding"): -8.1, ("B", "sliding"): 23.2})
 
 
 def with_law_of(d: Diagnosis, *columns: str) -> Diagnosis:

@@ -102,7 +102,7 @@ def test_the_error_on_loads_left_out_is_known_to_about_a_third_with_six_levels()
 def test_the_force_of_a_law_by_its_name_is_that_of_its_fit() -> None:
     load = np.array([1.0, 2.0, 4.0, 8.0])
     force = np.array([1.1, 1.9, 3.2, 5.9])
-    for law in CANDIDATES:
+    for law in CANDIDATES.values():
         values, _, force_at = fit_candidate(law, load, force)
         a, b = (*values, np.nan)[:2]
         np.testing.assert_allclose(force_N(law.name, a, b, load), force_at(load))

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.errors import Problem, TriboError, failed_by_system, of_the_system, system_problem, unexpected
+from tribo.errors import OF_THE_SYSTEM, Problem, TriboError, failed_by_system, system_problem, unexpected
 from tribo.kept_results import DamagedResultWarning
 from tribo.own_folder import BusyError, own_folder
 from tribo.records import Doubt, SetAside
@@ -550,7 +550,7 @@ def problems_of(why: Exception) -> tuple[Problem, ...]:
     """
     if isinstance(why, TriboError):
         by_system = why.__cause__ is not None and failed_by_system(why.__cause__)
-        return tuple(map(of_the_system, why.problems)) if by_system else why.problems
+        return tuple(replace(p, kind=OF_THE_SYSTEM) for p in why.problems) if by_system else why.problems
     if isinstance(why, OSError):
         logging.getLogger("tribo").debug("an error of the system", exc_info=why)
         return (system_problem(why),)

@@ -152,16 +152,15 @@ def agreements(study: Study) -> list[Agreement]:
     """Every sample in both regimes, static first; empty without a comparison."""
     ratios = ratios_of(study)
     flat = flat_sample(study)
+    columns = ["normal_load_N", "ratio", "ratio_low", "ratio_high"]
     return [
-        Agreement(str(sample), regime, tuple(_load_ratios(part)), sample == flat)
+        Agreement(
+            str(sample), regime, tuple(LoadRatio(*map(float, row)) for row in part[columns].to_numpy(float)),
+            sample == flat,
+        )
         for regime in REGIMES
         for sample, part in ratios[ratios["regime"] == regime].groupby("sample", sort=False)
-    ]
-
-
-def _load_ratios(part: pd.DataFrame) -> Iterable[LoadRatio]:
-    columns = ["normal_load_N", "ratio", "ratio_low", "ratio_high"]
-    return (LoadRatio(*map(float, row)) for row in part[columns].to_numpy(float))
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -295,6 +294,12 @@ def sample_numbers(study: Study) -> dict[str, int]:
     rest = sorted(tested - set(named))
     order = sorted([*named, *rest], key=lambda s: s != flat_sample(study))
     return {sample: k for k, sample in enumerate(order)}
+
+
+def tested_samples(study: Study) -> list[str]:
+    """The samples of which a pull was read, in the order of their places."""
+    read = {t.sample for t in study.ingested.campaign.tests if t.test_id in study.ingested.pulls}
+    return [sample for sample in sample_numbers(study) if sample in read]
 
 
 def is_anisotropic(pattern: Pattern) -> bool:

@@ -39,6 +39,7 @@ from tribo.records import (
     Pattern,
     Regime,
     Run,
+    StudyOptions,
 )
 
 if TYPE_CHECKING:
@@ -50,22 +51,6 @@ if TYPE_CHECKING:
 SOURCES = ("springblock", "laws", "records")  # packages whose sources decide a run
 SUFFIX = ".nc"
 WAIT_S = 86400.0  # for another process that runs the same cell: its runs are then there
-
-
-@dataclass(frozen=True)
-class ModelRuns:
-    """How the model is run for a campaign.
-
-    ``runs`` simulations per sample and load, at stratified pull angles with random local friction from ``seed``,
-    ``jobs`` at a time or on the workers of a dask scheduler at the address ``scheduler``. The folder ``kept`` holds the
-    calibration and every finished run; results made from other inputs are not used.
-    """
-
-    runs: int = 4
-    seed: int = 0
-    jobs: int = 2
-    kept: Path | None = None
-    scheduler: str | None = None
 
 
 @dataclass(frozen=True)
@@ -106,13 +91,9 @@ def cells_of(design: Iterable[SimConfig]) -> tuple[Cell, ...]:
 
 
 def run_cells(
-    cells: Sequence[Cell],
-    kept: Path | None = None,
-    jobs: int = 2,
-    scheduler: str | None = None,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    cells: Sequence[Cell], options: StudyOptions, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> pd.DataFrame:
-    """All runs of the cells as one table, one row per run; those that ``kept`` holds are taken from there.
+    """All runs of the cells as one table, one row per run; those that the folder ``kept`` holds are taken from there.
 
     Raises
     ------
@@ -124,6 +105,7 @@ def run_cells(
     from tribo.springblock import run_ensemble
     from tribo.springblock.kept_runs import fault_of, run_all_stored
 
+    kept, jobs = options.kept, options.jobs
     if kept is None:
         return run_ensemble([config for cell in cells for config in cell.configs], jobs, progress)
     kept.mkdir(parents=True, exist_ok=True)
@@ -132,7 +114,7 @@ def run_cells(
         if path.exists() and (fault := fault_of(configs, path)) is not None:
             warnings.warn(f"{path}: {fault.what}; these simulations are made again", DamagedResultWarning, stacklevel=2)
             path.unlink(missing_ok=True)
-    return pd.concat(run_all_stored(stores, jobs, scheduler, progress, wait_s=WAIT_S), ignore_index=True)
+    return pd.concat(run_all_stored(stores, jobs, options.scheduler, progress, wait_s=WAIT_S), ignore_index=True)
 
 
 def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
@@ -245,7 +227,6 @@ def remove_other_runs(cells: Iterable[Cell], kept: Path) -> None:
 
 
 Progress = Callable[[str, int, int], None]
-MODEL_RUNS = ModelRuns()
 MOST_LOADS = 8  # T(N) of the model is close to a straight line: more loads are interpolated
 
 
@@ -262,9 +243,7 @@ def predict(
     fits: tuple[LawFit, ...],
     flat: str,
     calibrated: tuple[LocalFriction, tuple[Cell, ...]],
-    model: ModelRuns = MODEL_RUNS,
-    *,
-    weights: str = "relative",
+    options: StudyOptions,
     progress: Progress = lambda stage, done, total: None,
 ) -> tuple[Comparison, pd.DataFrame, tuple[Run, ...]]:
     """Simulate every measured sample at the campaign's loads by the model as calibrated on the flat sample.
@@ -275,8 +254,7 @@ def predict(
     ----------
     fits : laws measured on the samples, the flat one among them
     calibrated : local friction and the runs to make, from :func:`calibrated_cells`
-    model : number of runs, seed, and where the model is run
-    weights : of the fits to the simulated forces
+    options : number of runs, seed, where the model is run, and the weights of the fits to the simulated forces
 
     Raises
     ------
@@ -289,16 +267,13 @@ def predict(
 
     campaign = ingested.campaign
     friction, cells = calibrated
-    table = run_cells(
-        cells, model.kept, model.jobs, model.scheduler,
-        lambda done, total: progress("simulating the samples", done, total),
-    )  # fmt: skip
+    table = run_cells(cells, options, lambda done, total: progress("simulating the samples", done, total))
     table = _as_forces(table, campaign)
     samples, base = dict.fromkeys(cell.sample for cell in cells), SimConfig()
-    simulated = _simulated_fits(table, campaign.area_m2, weights)
+    simulated = _simulated_fits(table, campaign.area_m2, options.weights)
     calibration = {**asdict(friction), "blocks_x": base.blocks[0], "blocks_y": base.blocks[1], "dt_s": base.dt_s}
     rows = _side_by_side(ingested, table, _flat_laws(fits, flat))
-    examples = tuple(example_run([c for c in cells if c.sample == sample], model.kept) for sample in samples)
+    examples = tuple(example_run([c for c in cells if c.sample == sample], options.kept) for sample in samples)
     return Comparison(simulated, rows, calibration, flat), table, examples
 
 
@@ -355,7 +330,7 @@ def calibrated_cells(
     campaign: Campaign,
     fits: tuple[LawFit, ...],
     flat: str,
-    model: ModelRuns = MODEL_RUNS,
+    options: StudyOptions,
     progress: Progress = lambda stage, done, total: None,
 ) -> tuple[LocalFriction, tuple[Cell, ...]]:
     """Local friction from the flat sample alone, and the runs that predict every sample, by sample and load.
@@ -375,16 +350,17 @@ def calibrated_cells(
     pressures = [campaign.nominal_pressure_Pa(load) for load in loads_to_simulate(campaign)]
     static, sliding = ((laws[regime].value("mu"), laws[regime].value("tau0_Pa")) for regime in REGIMES)
     calibration = partial(
-        calibrate, static, sliding, runs=CalibrationRuns(pressures, seed=model.seed), jobs=model.jobs,
+        calibrate, static, sliding, runs=CalibrationRuns(pressures, seed=options.seed), jobs=options.jobs,
         progress=lambda done, total: progress("calibrating on the flat sample", done, total),
     )  # fmt: skip
-    friction = kept_or_made(model.kept, "calibration", ((static, sliding), pressures, model.seed), calibration, SOURCES)
+    made_from = (static, sliding), pressures, options.seed
+    friction = kept_or_made(options.kept, "calibration", made_from, calibration, SOURCES)
     measured = {test.sample for test in campaign.tests}
     samples = {name: pattern for name, pattern in campaign.samples.items() if name in measured}
-    design = stratified_design(samples, pressures, model.runs, model.seed, SimConfig(friction=friction))
+    design = stratified_design(samples, pressures, options.runs, options.seed, SimConfig(friction=friction))
     cells = cells_of(design)
-    if model.kept is not None:
-        remove_other_runs(cells, model.kept)
+    if options.kept is not None:
+        remove_other_runs(cells, options.kept)
     return friction, cells
 
 
@@ -392,7 +368,7 @@ def run_named_cells(
     campaign: Campaign,
     fits: tuple[LawFit, ...],
     flat: str,
-    model: ModelRuns,
+    options: StudyOptions,
     only: str = "",
     progress: Progress = lambda stage, done, total: None,
 ) -> tuple[Cell, ...]:
@@ -403,20 +379,17 @@ def run_named_cells(
     CampaignError
         ``only`` names nothing this campaign measured.
     """
-    _, cells = calibrated_cells(campaign, fits, flat, model, progress)
+    _, cells = calibrated_cells(campaign, fits, flat, options, progress)
     chosen = tuple(c for c in cells if only in ("", c.sample, sample_as_word(c.sample), c.name))
     if not chosen and only != "calibration":
         allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
         raise CampaignError(Problem("no_such_cell", "no simulation has this name", found=only, allowed=allowed))
     if chosen:
-        run_cells(
-            chosen, model.kept, model.jobs, model.scheduler,
-            lambda done, total: progress("simulating the samples", done, total),
-        )  # fmt: skip
+        run_cells(chosen, options, lambda done, total: progress("simulating the samples", done, total))
     for sample in dict.fromkeys(c.sample for c in chosen):
         own = [c for c in cells if c.sample == sample]
         if any(example_config(own) in c.configs for c in chosen):
-            example_run(own, model.kept)
+            example_run(own, options.kept)
     return chosen
 
 

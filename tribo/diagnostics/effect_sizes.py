@@ -48,11 +48,6 @@ def bend_percent(score: FloatArray, line: FloatArray, log_ratio: FloatArray) -> 
     return float(percent(slope * np.ptp(score)))
 
 
-def contrast_percent(inside: FloatArray, outside: FloatArray) -> float:
-    """The geometric mean of measured / model ``inside`` over that ``outside``, less one; both as logarithms."""
-    return float(percent(inside.mean() - outside.mean()))
-
-
 def interval_percent(value: float, strength: float) -> tuple[float, float]:
     """Ends of the 90 % interval of a percentage that differs from zero by ``strength`` standard deviations in ln T."""
     middle = np.log1p(value / 100.0)
@@ -109,5 +104,5 @@ def _signed(contrast: Contrast, log_ratio: FloatArray, conditions: Conditions) -
         siblings = np.isin(sample, contrast.sample.split("/")) if contrast.kind == "specimen" else here
         inside, outside = siblings & (x > 0), siblings & (x <= 0)
         if inside.any() and outside.any():
-            return contrast_percent(y[inside], y[outside]), "groups"
+            return float(percent(y[inside].mean() - y[outside].mean())), "groups"
     return float("nan"), "extremes"

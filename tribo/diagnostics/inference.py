@@ -31,7 +31,7 @@ from tribo.diagnostics.model import (
     Target,
 )
 from tribo.diagnostics.normal_equations import model_columns
-from tribo.diagnostics.observations import Observations, session_of
+from tribo.diagnostics.observations import Observations
 from tribo.diagnostics.replicates import drawn_residuals, refits
 from tribo.diagnostics.scatter import Noise, held_still, log_size_prior
 from tribo.diagnostics.verdict import Estimate, Gain, Layer, Nuisance
@@ -355,11 +355,6 @@ def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | 
         rmse_percent_before=rmse_before,
         rmse_percent_after=rmse_after,
     )
-
-
-def gain_on_sessions(before: ModelFit, after: ModelFit) -> tuple[float, float]:
-    """What ``after`` gains over ``before`` on whole sessions left out: :func:`gain_on_groups`."""
-    return gain_on_groups(before, after, session_of(after.setup.observations.conditions))
 
 
 def gain_on_groups(before: ModelFit, after: ModelFit, group: NDArray[np.int64]) -> tuple[float, float]:

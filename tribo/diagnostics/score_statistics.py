@@ -77,7 +77,8 @@ def terms_of(contrasts: Sequence[tuple[EffectCourse, ...]], about_one: FloatArra
 
     Two courses of one specimen each, both of them contrasts of their own, are not written out.
     """
-    single = [k for k, courses in enumerate(contrasts) if len(courses) == 1 and _of_one_specimen(courses[0])]
+    one = [k for k, courses in enumerate(contrasts) if len(courses) == 1 and courses[0].freedom == 1]
+    single = [k for k in one if contrasts[k][0].specimen != EVERY]
     single.sort(key=lambda k: contrasts[k][0].specimen)
     place = {id(contrasts[k][0]): i for i, k in enumerate(single)}
     pairs = [k for k, courses in enumerate(contrasts) if len(courses) == 2 and all(id(c) in place for c in courses)]
@@ -100,10 +101,6 @@ def terms_of(contrasts: Sequence[tuple[EffectCourse, ...]], about_one: FloatArra
         np.array(single, np.int64), np.array(pair_of, np.int64).reshape(-1, 2), np.array(pairs, np.int64),
         about_one,
     )  # fmt: skip
-
-
-def _of_one_specimen(course: EffectCourse) -> bool:
-    return course.specimen != EVERY and course.freedom == 1
 
 
 def _shared_products(

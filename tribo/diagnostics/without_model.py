@@ -23,14 +23,12 @@ from tribo.diagnostics.column_search import (
 from tribo.diagnostics.direct_evidence import RunningIn, running_in, stroke_offset
 from tribo.diagnostics.planning import more_tests
 from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, TooLittle, Verdict
+from tribo.fitting.alternatives import CANDIDATES
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.records import REGIMES, Ingested, Study
 from tribo.vocabulary import label_with_unit
 
-UNITS = {"constant": ("N", ""), "linear": ("", "N"), "three_term": ("", "N")}
-NAMES = {"constant": ("T0",), "proportional": ("mu",), "hertz": ("a",), "linear": ("mu", "T0"), "power": ("a", "b")}
-WITH_CONSTANT = ("power", "linear", "constant", "three_term", "hertz")  # laws whose T need not vanish with the load
 BASELINE = "the law of each sample alone"
 SHOWN_BY = {shown: m.name for m in MECHANISMS.values() for shown in m.without_model}
 ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
@@ -55,7 +53,7 @@ def law_layers(study: Study) -> list[Layer]:
         constant = None
         if row is not None:
             formula, parameters = str(row["formula"]), _parameters(row)
-            if row["law"] in WITH_CONSTANT and (sample, regime) in lines:
+            if row["law"] != "proportional" and (sample, regime) in lines:
                 constant = _constant_part(lines[sample, regime], loads)
         else:
             ratio = part[f"{regime}_N"].to_numpy(float) / loads
@@ -73,10 +71,9 @@ def law_layers(study: Study) -> list[Layer]:
 
 def _parameters(row: Mapping[str, Any]) -> dict[str, Estimate]:
     """The parameters of a law with a row of the table of laws."""
-    names, units = NAMES.get(row["law"], ("a", "b")), UNITS.get(row["law"], ("", ""))
     return {
         name: _estimate(row[key], row[f"{key}_u"], unit, row["loads"] - row["parameters"])
-        for name, key, unit in zip(names, ("a", "b"), units, strict=False)
+        for (name, unit), key in zip(CANDIDATES[row["law"]].parameters, ("a", "b"), strict=False)
         if math.isfinite(row[key])
     }
 

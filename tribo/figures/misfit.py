@@ -71,22 +71,17 @@ def mechanism_label(name: str) -> str:
 
 def covariates(s: Setup) -> list[Covariate]:
     """The mean, the load and the bend with it, and every recorded column that varies; of text those of two names."""
+    from tribo.diagnostics.contrasts import numeric_covariates
+
     c, n = s.observations.conditions, s.observations.n
     found = [Covariate("mean", np.ones(n)), Covariate("normal_load_N", c.normal_load_N)]
     found.append(Covariate(BEND, c.normal_load_N))
-    found += [covariate(s, name) for name in numeric(s)]
+    found += [covariate(s, name) for name in numeric_covariates(s)]
     for name, column in c.columns.items():
         names = np.unique(column)
         if len(names) == 2 and name not in {f.name for f in found}:
             found.append(covariate(s, name))
     return found
-
-
-def numeric(s: Setup) -> list[str]:
-    """Names of the recorded numbers that vary and are complete."""
-    from tribo.diagnostics.contrasts import numeric_covariates
-
-    return list(numeric_covariates(s))
 
 
 def covariate(s: Setup, name: str) -> Covariate:
@@ -327,9 +322,7 @@ def _draw_panel(ax: Axes, part: pd.DataFrame, covariates: list[str], norm: TwoSl
     ax.set_xticks([])
     ax.set_xlim(0, len(covariates))
     ax.set_ylim(len(rows), 0)
-    ax.grid(visible=False)
-    ax.tick_params(length=0)
-    ax.spines[:].set_visible(False)
+    style.as_table(ax)
 
 
 def _signed(percent: float) -> str:

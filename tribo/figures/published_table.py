@@ -165,9 +165,7 @@ def _readings_axes(ax: Axes, readings: pd.DataFrame, mechanisms: list[str], n_gu
         label.set_fontweight("bold")
     ax.axvline(n_guesses, color="black", lw=0.8)
     ax.set_ylim(len(labels), 0)
-    ax.grid(visible=False)
-    ax.tick_params(length=0)
-    ax.spines[:].set_visible(False)
+    style.as_table(ax)
 
 
 PUBLISHED = style.FigureOf(

@@ -115,10 +115,10 @@ def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict
     weight = np.array(WEIGHTS[observable])
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     places = {s: i for i, s in enumerate(samples)}
-    x, y = column.values, percent(residual @ weight)
+    x, y, p_text = column.values, percent(residual @ weight), "< 0.001" if p < 1e-3 else f"= {p:.2g}"
     added = added_by_causes(d, residual, weight)
     common = {
-        "panel": k, "title": title, "detail": f"p {_p(p)}", "axis": _axis_name(column),
+        "panel": k, "title": title, "detail": f"p {p_text}", "axis": _axis_name(column),
         "y_axis": f"{NAMES[observable]}:\nmeasured / model − 1 (%)",
     }  # fmt: skip
     tests = [
@@ -144,9 +144,10 @@ def summaries(
 ) -> list[dict[str, Any]]:
     """Mean of ``y`` (n,) with its error, noise band and what the named mechanism adds, bin by bin of a column."""
     x = column.values
+    logarithmic = column.name in LOGARITHMIC and bool((x > 0).all())
     found: list[dict[str, Any]] = []
     for rows in _bins(x, here, column):
-        centre = float(np.exp(np.log(x[rows]).mean())) if _logarithmic(column) else float(x[rows].mean())
+        centre = float(np.exp(np.log(x[rows]).mean())) if logarithmic else float(x[rows].mean())
         at = {"x": centre, "x_name": _name(column, centre)}
         ratio = np.log1p(y[rows] / 100.0)  # geometric means, as the sentences of the verdict
         error = float(ratio.std(ddof=1) / np.sqrt(len(rows))) if len(rows) > 1 else float("nan")
@@ -187,10 +188,6 @@ def _bins(x: FloatArray, here: np.ndarray, column: Covariate) -> list[np.ndarray
     return [rows[codes == code] for code in np.unique(codes)]
 
 
-def _logarithmic(column: Covariate) -> bool:
-    return column.name in LOGARITHMIC and bool((column.values > 0).all())
-
-
 def _name(column: Covariate, value: float) -> str:
     return column.names[round(value)] if column.names else ""
 
@@ -206,10 +203,6 @@ def _title(contrast: Contrast) -> str:
     if contrast.kind == "specimen":
         return f"{contrast.title} ({contrast.sample})"
     return f"Sample {contrast.sample}" if contrast.sample else "All samples"
-
-
-def _p(p: float) -> str:
-    return "< 0.001" if p < 1e-3 else f"= {p:.2g}"
 
 
 @style.in_house_style
@@ -229,7 +222,8 @@ def _residual_panel(ax: Axes, part: pd.DataFrame) -> None:
     tests = part[part["mark"] == "test"]
     band = part[part["mark"] == "band"].sort_values("x")
     names = tests.drop_duplicates("x")[["x", "x_name"]].sort_values("x") if tests["x_name"].any() else None
-    shifted = tests["x"] + (0.22 * _jitter(len(tests)) if names is not None else 0.0)
+    spread = 2.0 * np.mod(np.arange(len(tests)) * 0.618034, 1.0) - 1.0  # evenly, by the golden ratio, in no order
+    shifted = tests["x"] + (0.22 * spread if names is not None else 0.0)
     for number, points in tests.groupby("sample_number"):
         colour, marker = style.sample_mark(int(float(str(number))))
         ax.plot(shifted[points.index], points["y"], marker, color=colour, ms=2.0, alpha=0.45, mew=0)
@@ -264,11 +258,6 @@ def _residual_axis(ax: Axes, part: pd.DataFrame, names: pd.DataFrame | None) -> 
     elif str(first["axis"]) in LOGARITHMIC_AXES:
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, tests["x"])
-
-
-def _jitter(n: int) -> FloatArray:
-    """Evenly spread numbers in -1..1 that do not follow the order: the golden ratio."""
-    return np.asarray(2.0 * np.mod(np.arange(n) * 0.618034, 1.0) - 1.0)
 
 
 def _residual_legend(numbers: pd.DataFrame) -> list[Any]:

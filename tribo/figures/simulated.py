@@ -234,12 +234,13 @@ def _draw_traces(ax: Axes, runs: list[tuple[int, pd.DataFrame]], numbers: pd.Dat
     handles = []
     for number, run in runs:
         colour, marker = style.sample_mark(number)
+        angle = true_minus(f"{run['angle_deg'].iloc[0]:.3g}°")
         trace, peak, window = (run[run["mark"] == m] for m in ("trace", "peak", "window"))
         ax.plot(trace["time_ms"], trace["T_over_N"], color=colour, lw=0.8, label=f"{run['sample'].iloc[0]}")
         ax.plot(peak["time_ms"], peak["T_over_N"], marker, color=colour, ms=5)
         handles += ax.plot(
             window["time_ms"], window["T_over_N"], ls=":", marker=marker, mfc="white", color=colour,
-            label=f"{run['sample'].iloc[0]} ({_angle(run['angle_deg'].iloc[0])})",
+            label=f"{run['sample'].iloc[0]} ({angle})",
         )  # fmt: skip
     pressures = " and ".join(f"{p:.3g}" for p in sorted(numbers["pressure_kPa"].unique()))
     style.panel_title(ax, "Simulated friction", f"p = {pressures} kPa, pull angle in the legend")
@@ -248,10 +249,6 @@ def _draw_traces(ax: Axes, runs: list[tuple[int, pd.DataFrame]], numbers: pd.Dat
     ax.set_ylim(bottom=0)
     ax.set_xlim(left=0)
     return handles
-
-
-def _angle(angle_deg: float) -> str:
-    return true_minus(f"{angle_deg:.3g}°")
 
 
 SIMULATED_PULLS = style.StudyFigure(

@@ -44,40 +44,34 @@ LAW_COLUMNS = ["sample", "regime", "law", "formula", "parameters", "a", "a_u", "
 
 @dataclass(frozen=True)
 class Candidate:
-    """A law T(N) with at most two parameters a and b; ``powers`` are the exponents of N its linear terms have.
-
-    The power law has none: it is a line in logarithms.
+    """A law T(N) with at most two ``parameters``, each with its unit; ``powers`` are the exponents of N its linear
+    terms have. The power law has none: it is a line in logarithms.
     """
 
     name: str
     formula: str
+    parameters: tuple[tuple[str, str], ...]
     powers: tuple[float, ...]
 
-    @property
-    def parameters(self) -> int:
-        return len(self.powers) or 2
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return {"power": ("a", "b"), "linear": ("mu", "T0")}.get(self.name, ("a",))
-
-
-CANDIDATES = (
-    Candidate("constant", "T = T₀", (0.0,)),
-    Candidate("proportional", "T = μ N", (1.0,)),
-    Candidate("hertz", "T = a N^(2/3)", (HERTZ,)),
-    Candidate("linear", "T = μ N + T₀", (1.0, 0.0)),
-    Candidate("power", "T = a N^b", ()),
-)
+CANDIDATES = {
+    law.name: law
+    for law in (
+        Candidate("constant", "T = T₀", (("T0", "N"),), (0.0,)),
+        Candidate("proportional", "T = μ N", (("mu", ""),), (1.0,)),
+        Candidate("hertz", "T = a N^(2/3)", (("a", ""),), (HERTZ,)),
+        Candidate("linear", "T = μ N + T₀", (("mu", ""), ("T0", "N")), (1.0, 0.0)),
+        Candidate("power", "T = a N^b", (("a", ""), ("b", "")), ()),
+    )
+}
 
 
 def force_N(law: str, a: float, b: float, load_N: FloatArray) -> FloatArray:
     """T of a candidate by its name and parameters, N; loads (n,) in N."""
     if law == "power":
         return np.asarray(a * load_N**b)
-    candidate = next(c for c in CANDIDATES if c.name == law)
-    values = (a, b)[: len(candidate.powers)]
-    return np.asarray(sum(value * load_N**power for value, power in zip(values, candidate.powers, strict=True)))
+    terms = zip((a, b), CANDIDATES[law].powers, strict=False)
+    return np.asarray(sum(value * load_N**power for value, power in terms))
 
 
 Fitted = tuple[FloatArray, FloatArray, Callable[[FloatArray], FloatArray]]
@@ -139,18 +133,18 @@ def _compared(rows: Rows, regime: Regime) -> list[dict[str, object]]:
     load, force = _medians(rows)
     if load.size < _FEWEST_LEVELS or meant_to_be_one(load):
         return []
-    squares = {law.name: _held_out(law, load, force) for law in CANDIDATES}
+    squares = {name: _held_out(law, load, force) for name, law in CANDIDATES.items()}
     excluded = {name for name in squares if _rejected(name, _best(squares), load, force)}
     chosen = choose({name: found for name, found in squares.items() if name not in excluded})
     found = []
-    for law in CANDIDATES:
+    for law in CANDIDATES.values():
         values, u, _ = fit_candidate(law, load, force)
         a, b = (*values, math.nan)[:2]
         a_u, b_u = (*u, math.nan)[:2]
         share, se = _root(squares[law.name])
         found.append(
             {"sample": rows.sample, "regime": regime, "law": law.name, "formula": law.formula,
-             "parameters": law.parameters, "a": a, "a_u": a_u, "b": b, "b_u": b_u, "held_out_percent": 100 * share,
+             "parameters": len(law.parameters), "a": a, "a_u": a_u, "b": b, "b_u": b_u, "held_out_percent": 100 * share,
              "se_percent": 100 * se, "loads": load.size, "chosen": law.name == chosen}
         )  # fmt: skip
     return found
@@ -192,7 +186,7 @@ def _rejected(name: str, best: str, load_N: FloatArray, force_N: FloatArray) -> 
     if fixed is None:
         return False
     place, value = fixed
-    values, u, _ = fit_candidate(next(law for law in CANDIDATES if law.name == best), load_N, force_N)
+    values, u, _ = fit_candidate(CANDIDATES[best], load_N, force_N)
     return abs(float(values[place]) - value) > _CONFIDENT * float(u[place])
 
 
@@ -202,14 +196,13 @@ def choose(squares: dict[str, FloatArray]) -> str:
     The standard error is that of the mean difference to the best law, level by level.
     """
     best = _best(squares)
-    parameters = {law.name: law.parameters for law in CANDIDATES}
 
     def no_worse(name: str) -> bool:
         away = squares[name] - squares[best]
         return float(away.mean()) <= float(away.std(ddof=1)) / math.sqrt(away.size)
 
     within = [name for name in squares if no_worse(name)]
-    return min(within, key=lambda name: (parameters[name], float(squares[name].mean())))
+    return min(within, key=lambda name: (len(CANDIDATES[name].parameters), float(squares[name].mean())))
 
 
 THREE_TERM = LAWS["three_term"]

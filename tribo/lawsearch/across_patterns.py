@@ -83,7 +83,9 @@ def deviations_of(f: ModelFit) -> Deviations:
     forces = base.forces(c.normal_load_N)
     share = np.column_stack([base.static_adhesion_N / forces.static_N, base.sliding_adhesion_N / forces.sliding_N])
     names = tuple(str(s) for s in np.unique(c.sample[c.area_fraction < 1.0]))
-    groups = {s: _by_load(c.normal_load_N, c.sample == s) for s in names}
+    by_load = {s: np.flatnonzero(c.sample == s) for s in names}
+    by_load = {s: rows[np.argsort(c.normal_load_N[rows], kind="stable")] for s, rows in by_load.items()}
+    groups = {s: np.array_split(rows, LOADS) for s, rows in by_load.items()}
     first = [int(np.flatnonzero(c.sample == s)[0]) for s in names]
     means = {
         key: np.array([[values[rows].mean(axis=0) for rows in groups[s]] for s in names]).reshape(len(names), LOADS, 2)
@@ -95,11 +97,6 @@ def deviations_of(f: ModelFit) -> Deviations:
     return Deviations(
         names, geometry, middle, np.swapaxes(means["left"], 1, 2), np.swapaxes(means["share"], 1, 2)
     )
-
-
-def _by_load(load_N: FloatArray, here: np.ndarray) -> list[np.ndarray]:
-    rows = np.flatnonzero(here)
-    return list(np.array_split(rows[np.argsort(load_N[rows], kind="stable")], LOADS))
 
 
 def column(term: Term, d: Deviations) -> FloatArray:

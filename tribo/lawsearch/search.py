@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtrc
 
 from tribo.diagnostics.contrasts import allowed_wrong_form, decided, share_beyond
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.inference import gain_on_sessions
+from tribo.diagnostics.inference import gain_on_groups
+from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes
 from tribo.lawsearch.grammar import WrittenLaw
@@ -96,7 +98,8 @@ def discover_laws(
             law = choose_form(model, grammar, best, p, rng)
         elif (free := _worth_counting(model, used)) is not None:
             likely = float(free.evidence(model.residual[None]).max())
-            p = share_beyond(_free_by_chance(model, free, likely, draws, progress), likely)
+            chance = _by_chance(model, partial(_likeliest, free), likely, draws, progress)
+            p = share_beyond(chance, likely)
             if p >= level:
                 break
             law = choose_free(model, free, used, p, rng)
@@ -112,7 +115,7 @@ def discover_laws(
 def _predicts_sessions(model: ModelFit, with_law: ModelFit) -> bool:
     """Whether a law of time predicts sessions that were left out better than days and drift do; where there are too few
     sessions to tell, it does not."""
-    gained, se = gain_on_sessions(model, with_law)
+    gained, se = gain_on_groups(model, with_law, session_of(with_law.setup.observations.conditions))
     return gained > BEYOND_DRIFT * se
 
 
@@ -161,17 +164,9 @@ def _best_by_chance(
     return _by_chance(model, best, strongest, draws, progress)
 
 
-def _free_by_chance(
-    model: ModelFit,
-    free: FreeSearch,
-    likeliest: float,
-    draws: tuple[int, np.random.Generator],
-    progress: Progress | None,
-) -> FloatArray:
-    """The same of curves and surfaces, each at the noise that it leaves."""
-    return _by_chance(
-        model, lambda drawn: free.evidence(drawn.transpose(0, 2, 1)).max(axis=(1, 2)), likeliest, draws, progress
-    )
+def _likeliest(free: FreeSearch, drawn: FloatArray) -> FloatArray:
+    """The evidence of the likeliest curve or surface in each drawn campaign, each at the noise that it leaves."""
+    return np.asarray(free.evidence(drawn.transpose(0, 2, 1)).max(axis=(1, 2)))
 
 
 def _by_chance(

@@ -53,7 +53,7 @@ def conditions(study: Study) -> list[Condition]:
 
 def _bodies(study: Study, tests: list[Test]) -> Iterator[Condition]:
     campaign = study.ingested.campaign
-    samples = [s for s in findings.sample_numbers(study) if any(t.sample == s for t in tests)]
+    samples = findings.tested_samples(study)
     yield Condition("Moving body, material", campaign.material or NOT_RECORDED, term="MaterialName")
     yield Condition("Counterface, material", campaign.counterface or NOT_RECORDED, term="MaterialName")
     yield Condition("Surface geometry", "; ".join(f"{s}: {_geometry(campaign.samples[s])}" for s in samples))

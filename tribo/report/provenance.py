@@ -404,16 +404,13 @@ def _input_hashes(campaign: Path, recorded: Mapping[str, str]) -> Iterator[tuple
         return
     root, names = campaign, list(recorded)
     if DESCRIBED_IN[0] in recorded:  # not so of two reports that were compared, whose folder may hold anything
-        root = campaign if (campaign / DESCRIBED_IN[0]).is_file() else _only_campaign_below(campaign)
+        if not (campaign / DESCRIBED_IN[0]).is_file():
+            below = sorted(p.parent for p in found_below(campaign, DESCRIBED_IN[0]))
+            root = below[0] if len(below) == 1 else campaign
         names = list(dict.fromkeys((*input_names(root), *recorded)))
     for name in names:
         if not leads_out(root, root / name) and (root / name).is_file():
             yield well_formed(name), file_hash(root / name)
-
-
-def _only_campaign_below(folder: Path) -> Path:
-    found = sorted(p.parent for p in found_below(folder, DESCRIBED_IN[0]))
-    return found[0] if len(found) == 1 else folder
 
 
 def _zipped_hashes(archive: Path, recorded: Mapping[str, str]) -> Iterator[tuple[str, str]]:

@@ -44,15 +44,19 @@ def daily_build(
         are given, or one of the texts contains a character that would end a line.
     """
     time = _TIME.fullmatch(at)
-    problems = [] if time else [_wrong("not_a_time", "not a time of day", "--at", at, "00:00 to 23:59")]
+    problems = []
+    if time is None:
+        what, allowed = "not a time of day", "00:00 to 23:59"
+        problems = [Problem("not_a_time", what, column="--at", found=at, allowed=allowed)]
     drop, site = drop.resolve(), site.resolve()
     texts = {"DROP": str(drop), "--site": str(site), "--notify": notify, "--mail": mail}
     problems += [p for option, text in texts.items() for p in _line_breaks(option, text)]
     if mail and not _ADDRESS.fullmatch(mail):
-        problems.append(_wrong("not_an_address", "not a mail address", "--mail", mail, "name@domain"))
+        what = "not a mail address"
+        problems.append(Problem("not_an_address", what, column="--mail", found=mail, allowed="name@domain"))
     if not _is_whole_command(notify):
         what, allowed = "not a complete command", "a command with all its quotes closed"
-        problems.append(_wrong("not_a_command", what, "--notify", notify, allowed))
+        problems.append(Problem("not_a_command", what, column="--notify", found=notify, allowed=allowed))
     if mail and notify:
         problems.append(Problem("two_notices", "give only one of these options", allowed="--notify or --mail"))
     if problems or time is None:
@@ -74,15 +78,11 @@ def build_command(drop: Path, site: Path, keep: int) -> list[str]:
     return [*tribo, "build", str(drop), "-o", str(site), "--keep", str(keep), "--quiet"]
 
 
-def _wrong(kind: str, what: str, option: str, found: str, allowed: str) -> Problem:
-    return Problem(kind, what, column=option, found=found, allowed=allowed)
-
-
 def _line_breaks(option: str, text: str) -> Iterator[Problem]:
     """A unit or crontab is read line by line, so that a text with a line end in it would add lines of its own."""
     if any(unicodedata.category(character) in _BREAKS_LINES for character in text):
         what = "this text contains a line end, another control character, or bytes that are not UTF-8"
-        yield _wrong("control_character", what, option, text, "one line of text")
+        yield Problem("control_character", what, column=option, found=text, allowed="one line of text")
 
 
 def _is_whole_command(notify: str) -> bool:

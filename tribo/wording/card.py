@@ -112,7 +112,7 @@ def _largest(fit: LawFit) -> str:
 
 def _counts(study: Study, used: int, aside: int, specimens: int) -> str:
     tests = [t for t in study.ingested.campaign.tests if t.test_id in study.ingested.pulls]
-    samples = [s for s in findings.sample_numbers(study) if any(t.sample == s for t in tests)]
+    samples = findings.tested_samples(study)
     levels = np.unique(findings.load_levels(np.array([t.normal_load_N for t in tests], float)))
     where = f"{counted(specimens, 'specimen')}, {counted(len(samples), 'sample')} ({joined(samples)})"
     loads = loads_in_words(levels.tolist()) if used else ""

@@ -65,7 +65,7 @@ def what_was_measured(study: Study) -> str:
     campaign, used = study.ingested.campaign, study.ingested.pulls
     aside = len(all_set_aside(study))
     tests = [t for t in campaign.tests if t.test_id in used]
-    samples = [s for s in findings.sample_numbers(study) if any(t.sample == s for t in tests)]
+    samples = findings.tested_samples(study)
     specimens = specimens_of(campaign, tests)
     loads = np.array([t.normal_load_N for t in tests])
     levels = np.unique(findings.load_levels(loads))

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.berardo2019.table_diagnosis import LEVEL, TableContrast, TableReading
 from tribo.berardo2019.table_model import TableFit, estimate_of, upper_limit
-from tribo.diagnostics.verdict import Gain, Misfit, Verdict
+from tribo.diagnostics.verdict import Gain, Misfit
 from tribo.mechanisms import MECHANISMS
 from tribo.vocabulary import OBSERVABLES
 from tribo.wording.numerals import p_text, sentence_case
@@ -17,15 +17,8 @@ from tribo.wording.numerals import p_text, sentence_case
 LEAST_ALIKE = 0.6  # correlations above this (less negative) no line over the range of the paper can have
 
 
-def published_sentence(v: Verdict) -> str:
-    """Whether the model of the paper fails, and in which readings of the table."""
-    outlooks, _ = v.shows
-    return _against_the_model(outlooks)
-
-
-def published_evidence(v: Verdict) -> str:
+def published_evidence(outlooks: Sequence[TableReading], gain: Gain) -> str:
     """What the numbers say of the explanations of the authors, and of the best extension."""
-    outlooks, gain = v.shows
     return " ".join([*_guesses(outlooks), _extension(outlooks[0], outlooks[0].weighed[0], gain)])
 
 
@@ -52,7 +45,7 @@ def _contrast(contrast: TableContrast | str) -> str:
     return f"{what} of {sample}{' against load' if along_load else ''}"
 
 
-def _against_the_model(outlooks: Sequence[TableReading]) -> str:
+def published_sentence(outlooks: Sequence[TableReading]) -> str:
     """Whether the model of the paper fails, and on what that depends."""
     possible = [o for o in outlooks if o.correlation < -LEAST_ALIKE]
     free = [o for o in outlooks if o.correlation == 0.0 and o.specimens == 1]

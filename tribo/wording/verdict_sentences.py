@@ -100,7 +100,7 @@ def worded(v: Verdict) -> Verdict:
         next_test=replace(v.next_test, text=next_test_sentence(v.next_test)) if v.next_test is not None else None,
     )
     if of_a_table:
-        v = replace(v, sentence=published_sentence(v), evidence=published_evidence(v))
+        v = replace(v, sentence=published_sentence(v.shows[0]), evidence=published_evidence(*v.shows))
         return replace(v, text=f"{v.sentence} {v.evidence}")
     if isinstance(v.shows, ColumnsTested):
         return _without_model(v)

@@ -178,14 +178,8 @@ def refuse_not_finite(state: k.State, numerics: k.Numerics) -> None:
     """Raise SimulationError with the block and the time where a force became no number."""
     if state.counts[k.CODE] != k.NOT_FINITE:
         return
-    bad = np.flatnonzero(~np.isfinite(state.cells[:, k.QX : k.VY + 1]).all(axis=1))
-    y, x = divmod(int(bad[0]), numerics.nx) if bad.size else (-1, -1)
-    t = numerics.start + state.counts[k.STEP] * numerics.dt
-    raise SimulationError(
-        Problem(
-            "not_finite", f"the force is no longer finite at t = {t:.9g} s",
-            found=f"{bad.size} blocks, the first at x = {x}, y = {y}", allowed="a smaller dt_s",
-        )
+    raise k.not_finite(
+        state.cells[:, k.QX : k.VY + 1], numerics.nx, numerics.start + state.counts[k.STEP] * numerics.dt
     )
 
 

@@ -26,7 +26,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
 from tribo.springblock.engines.jit import compiled
@@ -45,6 +44,7 @@ from tribo.springblock.engines.state import (
     first_failure_s,
     longest_rise_s,
     machine_of,
+    not_finite,
     once,
     time_of,
 )
@@ -377,7 +377,7 @@ def integrate(
     kept = integrate_all(run, steps, np.zeros((10, *run.u.shape)))
     out, sums = run.out, run.sums
     if not np.isfinite(sums[FORCE]):
-        _refuse(run.u, lattice, float(out.time[kept - 1]))
+        raise not_finite(run.u, lattice.nx, float(out.time[kept - 1]))
     return Trajectory(
         time_s=np.concatenate([(0.0, start), out.time[:kept]]),
         force_N=np.concatenate([(0.0, drive.force_rate * slider_s), out.force[:kept]]),
@@ -407,16 +407,3 @@ def _bond_energy(m: Model) -> float:
     stretch = m.bond * np.hypot(*(m.u - m.anchor).T)
     force = np.where(m.resting, stretch, m.sliding)[m.bond > 0.0]
     return float(0.5 * (force**2 / m.bond[m.bond > 0.0]).sum())
-
-
-def _refuse(u: FloatArray, lattice: Lattice, t: float) -> None:
-    bad = np.flatnonzero(~np.isfinite(u).all(axis=1))
-    y, x = divmod(int(bad[0]), lattice.nx) if bad.size else (-1, -1)
-    raise SimulationError(
-        Problem(
-            "not_finite",
-            f"the force is no longer finite at t = {t:.9g} s",
-            found=f"{bad.size} blocks, the first at x = {x}, y = {y}",
-            allowed="a smaller dt_s",
-        )
-    )

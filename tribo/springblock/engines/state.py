@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.springblock.config import FrictionTerms, SimConfig, mask_of
 from tribo.springblock.engines.jit import inner
@@ -241,6 +242,18 @@ def observe(steps: int, moving: int, s: State, out: Samples, c: Numerics) -> Non
         s.counts[CODE] = NOT_FINITE
     elif t > c.stop_at_peaks * s.totals[PEAK_TIME]:
         s.counts[CODE] = FINISHED
+
+
+def not_finite(blocks: FloatArray, nx: int, t: float) -> SimulationError:
+    """The error of a run in which a force became no number, with the first block (n, ...) and the time in s."""
+    bad = np.flatnonzero(~np.isfinite(blocks).all(axis=1))
+    y, x = divmod(int(bad[0]), nx) if bad.size else (-1, -1)
+    return SimulationError(
+        Problem(
+            "not_finite", f"the force is no longer finite at t = {t:.9g} s",
+            found=f"{bad.size} blocks, the first at x = {x}, y = {y}", allowed="a smaller dt_s",
+        )
+    )
 
 
 @dataclass(frozen=True)
