@@ -892,18 +892,18 @@ class TraceLaw:
     Parameters
     ----------
     law : str
-        Name of the law, as in :data:`tribo.slider.SLIDER_LAWS`.
+        Name of the law, as in :data:`tribo.slider.SLIDER_LAWS`, or in ``tribo.tracelaws.DRIVEN_LAWS`` of strokes.
     parameters : tuple of TraceLawParameter
         Parameters of law and machine with intervals.
     log_likelihood : float
-        Of slips: log density of all slips, each by a fit without its part of the record. Of steps of speed: of the
-        whole record, without the terms that two laws share.
+        Of slips and strokes: log density of all of them, each by a fit without its part of the record. Of steps of
+        speed: of the whole record, without the terms that two laws share.
     samples : int
-        Slips or samples that count.
+        Slips, strokes or samples that count.
     evidence : str
-        "slips" or "steps of speed".
+        "slips", "strokes" or "steps of speed".
     scores : tuple of float
-        Log density of each slip left out of the fit; empty for steps of speed.
+        Log density of each slip or stroke left out of the fit; empty for steps of speed.
     test_id : str
         The test.
     """

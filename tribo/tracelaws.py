@@ -1,13 +1,14 @@
-"""Friction laws and machines read from whole traces: from slips, and from steps of speed.
+"""Friction laws and machines read from whole traces: from slips, from steps of speed, and from strokes to and fro.
 
 Which records of a campaign hold a law beyond mu and tau0, slips under Coulomb friction or its growth at rest (maximum
-likelihood over slips), and rate and state from steps of speed (least squares of whitened residuals).
+likelihood over slips), rate and state from steps of speed (least squares of whitened residuals), and friction with
+backlash from a drive that goes to and fro (least squares, with strokes as the evidence).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from typing import Any
@@ -498,7 +499,8 @@ def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]
     law
         "auto", or the name of one law. Under "auto" the ageing law is chosen over Coulomb's where it predicts slips
         left out better by twice the standard error, and the ageing law of Dieterich or the slip law of Ruina where its
-        likelihood is 20 times that of the other; laws that are tied are all given.
+        likelihood is 20 times that of the other; of a drive that goes to and fro, a law of ``DRIVEN_LAWS`` where none
+        predicts strokes left out better by twice the standard error. Laws that are tied are all given.
     """
     tests = {test.test_id: test for test in ingested.campaign.tests}
     found: list[TraceLaw] = []
@@ -510,6 +512,7 @@ def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]
         fitted = [
             *_of_slips(traces, ingested, tests, law),
             *_of_steps(traces, ingested, tests, law),
+            *_of_strokes(traces, law),
         ]
         found += [replace(one, test_id=one.test_id or name) for one in fitted]
     return tuple(found)
@@ -570,7 +573,7 @@ def _of_steps(
     traces: Sequence[tuple[str, Trace]], ingested: Ingested, tests: dict[str, Test], law: str
 ) -> Iterable[TraceLaw]:
     """Rate and state of a record with steps of speed, whose pieces are joined."""
-    if law not in ("auto", *STEP_LAWS):
+    if law not in ("auto", *STEP_LAWS) or len(set(_ways([trace for _, trace in traces]))) > 1:
         return
     test, pulls = tests[traces[0][0]], [ingested.pulls[name] for name, _ in traces if name in ingested.pulls]
     trace, pull = _joined([trace for _, trace in traces]), pulls[0]
@@ -585,6 +588,26 @@ def _of_steps(
     wanted = STEP_LAWS if law == "auto" else (law,)
     fitted = fit_laws(trace.time_s[inside], friction, drive, wanted, known)
     yield from chosen_step_laws(fitted)
+
+
+def _of_strokes(traces: Sequence[tuple[str, Trace]], law: str) -> Iterable[TraceLaw]:
+    """A slider that is driven to and fro, of a record with strokes in both directions, which are joined."""
+    wanted = [name for name in DRIVEN_LAWS if law in ("auto", name)]
+    strokes = [trace for _, trace in traces]
+    ways = _ways(strokes)
+    if not wanted or len(strokes) < _FEWEST_STROKES or set(ways) != {-1.0, 1.0}:
+        return
+    # the force of a stroke is positive against its motion: as recorded, it has the sign of the way
+    record = _joined([replace(trace, force_N=way * trace.force_N) for way, trace in zip(ways, strokes, strict=True)])
+    if record.displacement_m is not None:
+        fitted = [fit_driven(record.displacement_m, record.force_N, name) for name in wanted]
+        yield from chosen_slip_laws([one for one in fitted if one is not None])
+
+
+def _ways(traces: Sequence[Trace]) -> list[float]:
+    """Direction of each piece by its displacement, 1 or -1; 0 where none was recorded."""
+    places = [trace.displacement_m for trace in traces]
+    return [0.0 if place is None else float(np.sign(place[-1] - place[0])) for place in places]
 
 
 def _drive_of(trace: Trace, phases: Sequence[Phase]) -> tuple[float, float, Drive] | None:
@@ -615,3 +638,174 @@ def _line(trace: Trace, phase: Phase) -> tuple[float, float]:
     slope, at_zero = np.polyfit(trace.time_s[inside], trace.displacement_m[inside], 1)
     sign = math.copysign(1.0, slope)
     return float(abs(slope)), float(sign * at_zero)
+
+
+_PLAIN = ("sliding_N", "stiffness_N_per_m", "zero_N")
+_PLAY = ("sliding_N", "stiffness_N_per_m", "backlash_m", "zero_N")
+_WAYS = ("forward_N", "backward_N", "stiffness_N_per_m", "backlash_m", "zero_N")
+DRIVEN_LAWS: dict[str, tuple[str, ...]] = {
+    "driven": _PLAIN,
+    "driven_backlash": _PLAY,
+    "driven_directions": _WAYS,
+    "driven_springy_backlash": (*_WAYS, "gap_stiffness_N_per_m"),
+}
+"""Parameters of a slider that is driven to and fro, by law; each law has the one before it in it."""
+_FEWEST_STROKES = 6
+_TURN = 0.02  # share of the range of the displacement by which a drive has to go back before a stroke ends
+_MOST_SAMPLES = 3000  # of a record in a fit: neighbours tell the same
+_WAY_TO_SLIDE = (0.02, 0.06, 0.18)  # starts: way of the drive until the slider slides, as a share of its range
+
+
+def driven_force(displacement_m: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    """Force on a slider without inertia that a drive moves to and fro through a spring with backlash.
+
+    The slider rests until the force reaches ``forward_N`` or ``-backward_N`` (or ``sliding_N`` both ways), and then
+    follows the drive at that force. Within the backlash the spring has the stiffness ``gap_stiffness_N_per_m``, beyond
+    it ``stiffness_N_per_m``. It is the limit of :func:`tribo.simulate_slider` for a slow drive or a light slider.
+
+    Parameters
+    ----------
+    displacement_m
+        Displacement of the drive, shape (n,), in m; counted from the first sample, where the spring is slack.
+    values : mapping
+        Parameters by name: those of a law in ``tribo.tracelaws.DRIVEN_LAWS``. What is not named is 0; ``start_m`` is
+        how far the slider is from the drive at the first sample.
+
+    Returns
+    -------
+    array, shape (n,)
+        Force in N, with the zero of the load cell ``zero_N`` added.
+
+    Examples
+    --------
+    >>> from tribo.tracelaws import driven_force
+    >>> values = {"sliding_N": 10.0, "stiffness_N_per_m": 1e4, "backlash_m": 1e-3}
+    >>> driven_force([0.0, 0.0005, 0.001, 0.002, 0.0015, 0.0005, -0.0005], values).round(3).tolist()
+    [0.0, 0.0, 5.0, 10.0, 5.0, 0.0, -5.0]
+    """
+    place = np.asarray(displacement_m, float)
+    place = place - place[0]
+    k, half, soft = (values.get(name, 0.0) for name in ("stiffness_N_per_m", "backlash_m", "gap_stiffness_N_per_m"))
+    half *= 0.5
+
+    def stretch(force_N: float) -> float:
+        return force_N / soft if force_N < soft * half else half + (force_N - soft * half) / k
+
+    ahead = stretch(values.get("forward_N", values.get("sliding_N", 0.0)))
+    behind = stretch(values.get("backward_N", values.get("sliding_N", 0.0)))
+    x, slider = values.get("start_m", 0.0), []
+    for X in place.tolist():
+        x = min(max(x, X - ahead), X + behind)
+        slider.append(x)
+    u = place - np.array(slider)
+    inside = np.clip(u, -half, half)
+    return np.asarray(k * (u - inside) + soft * inside + values.get("zero_N", 0.0))
+
+
+def fit_driven(displacement_m: FloatArray, force_N: FloatArray, law: str = "driven_backlash") -> TraceLaw | None:
+    """Friction, stiffness and backlash of a slider that is driven to and fro; None with fewer than six strokes.
+
+    Least squares of the force. What the law lacks is alike from sample to sample, so the intervals take each stroke as
+    one piece of evidence (Liang and Zeger, Biometrika 73 (1986) 13).
+
+    Parameters
+    ----------
+    displacement_m, force_N
+        The record, shape (n,), in m and N; both with the sign that they were recorded with.
+    law : str
+        Name in ``tribo.tracelaws.DRIVEN_LAWS``.
+
+    Returns
+    -------
+    TraceLaw
+        The parameters of :func:`driven_force` with 95 % intervals. ``log_likelihood`` and ``scores`` are those of
+        strokes left out of the fit, each as one sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tribo.tracelaws import driven_force, fit_driven
+    >>> drive = 0.02 * np.sin(np.linspace(0.0, 25.0, 2000))
+    >>> force = driven_force(drive, {"sliding_N": 10.0, "stiffness_N_per_m": 1e4, "backlash_m": 3e-3})
+    >>> law = fit_driven(drive, force + 0.1 * np.random.default_rng(0).standard_normal(2000))
+    >>> round(law["sliding_N"].value, 1), round(1e3 * law["backlash_m"].value, 1)
+    (10.0, 3.0)
+    """
+    place, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
+    stroke = _strokes(place)
+    if stroke[-1] + 1 < _FEWEST_STROKES:
+        return None
+    thin = slice(None, None, -(-place.size // _MOST_SAMPLES))
+    place, force, stroke = place[thin], force[thin], stroke[thin]
+    best, jacobian, residuals = _driven_fit(place, force, law, np.ones(place.size, bool))
+    count = int(stroke[-1]) + 1
+    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)  # newtons beside metres: else the small ones are lost
+    jacobian = jacobian / size
+    bread = np.linalg.pinv(jacobian.T @ jacobian)
+    parts = np.array([jacobian[stroke == k].T @ residuals[stroke == k] for k in range(count)])
+    covariance = bread @ (parts.T @ parts) @ bread * count / (count - 1)
+    half = float(student.ppf(0.975, count - 1)) * np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size
+    scores = np.empty(count)
+    fold = np.arange(count) * 5 // count
+    for k in range(5):
+        out = fold[stroke] == k
+        left = _driven_residuals(place, force, law, _driven_fit(place, force, law, ~out, best)[0])
+        for one in np.flatnonzero(fold == k):
+            scores[one] = -0.5 * math.log(max(float(np.mean(left[stroke == one] ** 2)), 1e-300))
+    rows = tuple(
+        TraceLawParameter(
+            name, float(v), float(v - h), float(v + h), "m" if name.endswith("_m") and "per" not in name else
+            "N/m" if "per" in name else "N", bool(h < abs(v) or name in ("zero_N", "start_m")),
+        )
+        for name, v, h in zip((*DRIVEN_LAWS[law], "start_m"), best, half, strict=True)
+    )  # fmt: skip
+    return TraceLaw(law, rows, float(scores.sum()), count, "strokes", tuple(scores))
+
+
+def _strokes(place: FloatArray) -> np.ndarray:
+    """The number of the stroke that every sample is in: a stroke ends where the drive turns."""
+    least = _TURN * float(np.ptp(place))
+    ends, extreme, sense = [], 0, 0
+    for i, X in enumerate(place.tolist()):
+        ahead = (X - place[extreme]) * (sense or 1)
+        if sense == 0 and abs(X - place[0]) > least:
+            sense, extreme = (-1 if place[0] > X else 1), i
+        elif ahead > 0 and sense:
+            extreme = i
+        elif -ahead > least and sense:
+            ends.append(extreme)
+            sense, extreme = -sense, i
+    return np.searchsorted(np.array(ends), np.arange(place.size), side="left")
+
+
+def _driven_residuals(place: FloatArray, force: FloatArray, law: str, p: FloatArray) -> FloatArray:
+    return driven_force(place, dict(zip((*DRIVEN_LAWS[law], "start_m"), p.tolist(), strict=True))) - force
+
+
+def _driven_fit(
+    place: FloatArray, force: FloatArray, law: str, used: Any, start: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Best values, the last of them where the slider starts, with slopes and residuals of the samples that are used."""
+    low, high = (float(q) for q in np.quantile(force, [0.1, 0.9]))
+    size, way = 0.5 * (high - low), float(np.ptp(place))
+    names = (*DRIVEN_LAWS[law], "start_m")
+    least = {"zero_N": low, "start_m": -way}
+    most = {"zero_N": high, "start_m": way}
+    bounds = np.array([[least.get(n, 0.0), most.get(n, math.inf)] for n in names]).T
+    unit = {"backlash_m": 0.1 * way, "start_m": 0.1 * way, "stiffness_N_per_m": size / (0.1 * way)}
+    unit["gap_stiffness_N_per_m"] = 0.1 * unit["stiffness_N_per_m"]
+    scale = np.array([unit.get(n, size) for n in names])
+    starts = [start] if start is not None else []
+    for share in _WAY_TO_SLIDE if start is None else ():
+        first = {"stiffness_N_per_m": size / (share * way), "backlash_m": 0.5 * share * way, "start_m": 0.0,
+                 "gap_stiffness_N_per_m": 0.05 * size / (share * way), "zero_N": 0.5 * (low + high)}  # fmt: skip
+        starts.append(np.array([first.get(n, size) for n in names]))
+    found = [
+        least_squares(
+            lambda p: _driven_residuals(place, force, law, p)[used] / size, one, x_scale=scale,
+            bounds=bounds, diff_step=1e-4, max_nfev=40,
+        )
+        for one in starts
+    ]  # fmt: skip
+    best = min(found, key=lambda fitted: float(fitted.cost))
+    return np.asarray(best.x), np.asarray(best.jac), np.asarray(best.fun)

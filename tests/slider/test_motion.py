@@ -21,6 +21,7 @@ from tribo.slider import (
     speed_steps,
     steady_sliding_speed_m_s,
 )
+from tribo.slider.oscillator import first_fall
 
 COULOMB = SliderConfig(
     mass_kg=0.0307, stiffness_N_per_m=168.0, normal_load_N=0.3011, values={"mu_s": 0.33, "mu_d": 0.30}, rate_Hz=4000.0
@@ -191,3 +192,9 @@ def test_equal_seeds_draw_equal_noise():
     one, same, other = (simulate_slider(COULOMB.with_(noise_N=1e-3, seed=s, duration_s=1.0)).force_N for s in (4, 4, 5))
     np.testing.assert_array_equal(one, same)
     assert (one != other).all()
+
+
+def test_a_start_at_zero_whose_slope_is_negative_by_rounding_alone_is_no_fall():
+    grid = np.linspace(0.0, 1e-3, 5)
+    assert first_fall(lambda t: t * t - 1e-20 * t, lambda t: 2 * t - 1e-20, grid) == math.inf
+    assert first_fall(lambda t: t * t - 1e-4 * t, lambda t: 2 * t - 1e-4, grid) == 0.0

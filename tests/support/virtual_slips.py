@@ -1,8 +1,8 @@
 """Virtual records of known laws for the exam of laws read from traces; nothing of tribo.slider or tribo.tracelaws.
 
 Slips: a fixed-step Runge-Kutta integration of a slider that is pulled through a spring and a damper, whose static
-friction is drawn anew for every slip. Steps of speed: scipy's odeint on friction and the state variable theta. Noise is
-autoregressive of order one on top of white noise.
+friction is drawn anew for every slip. Strokes: relaxation in small steps. Steps of speed: scipy's odeint on friction
+and the state variable theta. Noise is autoregressive of order one on top of white noise.
 """
 
 from __future__ import annotations
@@ -90,3 +90,27 @@ def velocity_step(
     friction = np.concatenate([np.full((time < step_s).sum(), mu0), solved[1:, 0]])
     place = np.where(time < step_s, v1 * time, v1 * step_s + v2 * (time - step_s))
     return time, friction + drift_per_m * place + coloured(rng, time.size, noise)
+
+
+def strokes(
+    rng: np.random.Generator, *, forward_N: float, backward_N: float, stiffness: float, backlash_m: float,
+    amplitude_m: float, frequency_Hz: float, cycles: int, rate_Hz: float, noise_N: float,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Displacement and force of a slider without mass behind a gap, under a sinusoid that grows over its first cycle.
+
+    In small steps of time, half of what the spring carries beyond friction relaxes in each.
+    """
+    steps = 40
+    n = round(cycles / frequency_Hz * rate_Hz)
+    dt = 1.0 / rate_Hz / steps
+    time = np.arange(n * steps) * dt
+    drive = amplitude_m * np.minimum(time * frequency_Hz, 1.0) * np.sin(2 * math.pi * frequency_Hz * time)
+    force, x, half = np.empty(n * steps), 0.0, 0.5 * backlash_m
+    for i, X in enumerate(drive.tolist()):
+        u = X - x
+        pull = stiffness * (u - half if u > half else u + half if u < -half else 0.0)
+        force[i] = pull
+        limit = forward_N if pull > 0 else backward_N
+        if abs(pull) > limit:
+            x += math.copysign(0.5 * (abs(pull) - limit) / stiffness, pull)
+    return drive[::steps], force[::steps] + coloured(rng, n, noise_N)

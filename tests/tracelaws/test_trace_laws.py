@@ -9,10 +9,20 @@ from pathlib import Path
 import numpy as np
 import on_the_command_line
 import pytest
-from support.virtual_slips import slips, velocity_step
+from support.virtual_slips import slips, strokes, velocity_step
 
-from tribo.slider import SliderConfig, constant_speed, simulate_slider, speed_steps
-from tribo.tracelaws import chosen_step_laws, clearly_better, fit_laws, fit_slips, slip_force, whitening
+from tribo.slider import SliderConfig, constant_speed, recorded_displacement, simulate_slider, speed_steps
+from tribo.tracelaws import (
+    chosen_slip_laws,
+    chosen_step_laws,
+    clearly_better,
+    driven_force,
+    fit_driven,
+    fit_laws,
+    fit_slips,
+    slip_force,
+    whitening,
+)
 
 COULOMB = {"mass_kg": 0.03, "stiffness": 170.0, "damping": 0.3, "load_N": 0.3, "speed_m_s": 1e-3, "mu_s": 0.36,
            "mu_d": 0.30, "scatter": 0.004, "duration_s": 12.0, "noise_N": 3e-4}  # fmt: skip
@@ -120,3 +130,54 @@ def test_the_command_writes_the_laws_of_a_record_with_stick_slip(tmp_path: Path)
     assert float(found["mass_kg"]["low"]) < 0.0305
     assert found["mu_d"]["told"] == "yes"
     assert {row["law"] for row in found.values()} == {"coulomb"}
+
+
+DRIVEN = {"forward_N": 12e3, "backward_N": 8e3, "stiffness": 4e6, "backlash_m": 4e-3, "amplitude_m": 0.02,
+          "frequency_Hz": 1.0, "cycles": 8, "rate_Hz": 200.0, "noise_N": 200.0}  # fmt: skip
+
+
+def test_the_force_of_a_slider_without_inertia_is_that_of_a_light_simulated_one():
+    time = np.linspace(0.0, 8.0, 801)
+    drive = 0.02 * np.sin(1.5 * time)
+    values = {"sliding_N": 10.0, "stiffness_N_per_m": 4e3, "backlash_m": 3e-3}
+    config = SliderConfig(
+        1e-3, 4e3, 1.0, 10.0, values={"mu_s": 1.0, "mu_d": 1.0}, drive=recorded_displacement(time, drive),
+        backlash_m=3e-3, duration_s=8.0, rate_Hz=100.0,
+    )  # fmt: skip
+    np.testing.assert_allclose(simulate_slider(config).force_N, driven_force(drive, values), rtol=0, atol=0.1)
+
+
+def test_friction_each_way_stiffness_and_backlash_are_recovered_from_strokes_and_equal_friction_is_refused():
+    drive, force = strokes(np.random.default_rng(4), **DRIVEN)
+    made = [fit_driven(drive, force + 1.5e3, law) for law in ("driven_backlash", "driven_directions")]
+    assert made[1] is not None
+    assert [law.law for law in chosen_slip_laws(made)] == ["driven_directions"]
+    truths = {"forward_N": 12e3, "backward_N": 8e3, "stiffness_N_per_m": 4e6, "backlash_m": 4e-3, "zero_N": 1.5e3}
+    for name, truth in truths.items():
+        p = made[1][name]
+        assert p.told
+        assert p.value == pytest.approx(truth, rel=0.05)
+        half = 0.5 * (p.high - p.low)
+        assert 0.0 < half < 0.1 * truth
+        assert abs(p.value - truth) < 2.0 * half
+
+
+def test_five_strokes_tell_no_law():
+    drive, force = strokes(np.random.default_rng(4), **DRIVEN | {"cycles": 2})
+    assert fit_driven(drive, force) is None
+
+
+def test_the_command_reads_a_drive_that_goes_to_and_fro_and_takes_its_strokes_for_no_steps_of_speed(tmp_path: Path):
+    drive, force = strokes(np.random.default_rng(4), **DRIVEN)
+    folder = tmp_path / "c"
+    (folder / "raw").mkdir(parents=True)
+    (folder / "campaign.toml").write_text('[campaign]\ntitle = "t"\n[patterns.F]\ncavity = "none"\n')
+    (folder / "tests.csv").write_text("test_id,file,sample,normal_load_N\nT1,raw/a.csv#*,F,20000\n")
+    rows = [f"{i / 200:.4f},{f:.5f},{1e3 * x:.6f}" for i, (f, x) in enumerate(zip(force, drive, strict=True))]
+    (folder / "raw" / "a.csv").write_text("Time (s),Friction force (N),Position (mm)\n" + "\n".join(rows) + "\n")
+    result = on_the_command_line.run("fit", folder, "-o", tmp_path / "out", "--trace-law", "auto")
+    assert result.exit_code == 0, result.stderr
+    with open(tmp_path / "out" / "tracelaws.csv", newline="") as file:
+        found = {row["parameter"]: row for row in csv.DictReader(file) if row["law"] == "driven_directions"}
+    assert float(found["forward_N"]["value"]) == pytest.approx(12e3, rel=0.05)
+    assert float(found["backward_N"]["value"]) == pytest.approx(8e3, rel=0.05)

@@ -53,6 +53,11 @@ if TYPE_CHECKING:
     from tribo.stages import Progress, StudyOptions, Until
     from tribo.wording.card import Card
 
+_TRACE_LAWS = (
+    "auto", "coulomb", "ageing", "dieterich", "ruina", "driven", "driven_backlash", "driven_directions",
+    "driven_springy_backlash",
+)  # fmt: skip
+
 
 @click.command()
 @CAMPAIGN
@@ -73,9 +78,10 @@ def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 @OUT
 @DRY_RUN
 @click.option(
-    "--trace-law", type=click.Choice(["auto", "coulomb", "ageing", "dieterich", "ruina"]),
-    help="Read a law and the machine from whole records with stick-slip (coulomb, ageing) or steps of speed "
-    "(dieterich, ruina), with intervals; auto: the law that fits. Writes tracelaws.csv.",
+    "--trace-law", type=click.Choice(_TRACE_LAWS), metavar="LAW",
+    help="Read a law and the machine from whole records with stick-slip (coulomb, ageing), steps of speed "
+    "(dieterich, ruina) or strokes to and fro (driven, driven_backlash, driven_directions, driven_springy_backlash), "
+    "with intervals; auto: the law that fits. Writes tracelaws.csv.",
 )
 @fit_options
 @command_options

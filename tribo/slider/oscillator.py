@@ -144,7 +144,8 @@ def first_fall(function: Function, slope: Function, grid: FloatArray) -> float:
         low, high = float(grid[i]), float(grid[i + 1])
         if dips[i]:
             bottom = brentq(slope, low, high, **EXACT)
-            if not function(bottom) < touches[i]:
+            # a start at zero has reached nothing: rounding of its slope is told from a fall by where it rises to
+            if not function(bottom) < (touches[i] or -_ROUNDING * abs(values[i + 1])):
                 continue
             high = bottom
         elif not function(low) > 0.0:
