@@ -41,7 +41,8 @@ class Commands(click.Group):
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="tribo")
 def main() -> None:
-    """Analyse sled friction tests: fit mu and tau0, compare with a spring-block model.
+    """Evaluate friction tests: read the records of any tribometer or tensile machine, fit friction laws, compare with a
+    spring-block model, and find what explains the difference.
 
     \b
     Start with:  tribo demo -o out

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 _SLIDER_NUMBERS = {
-    "mass_kg": ("--mass", "KG", "Mass of the slider in kg."),
-    "stiffness_N_per_m": ("--stiffness", "N_PER_M", "Stiffness between drive and slider in N/m."),
-    "damping_N_s_per_m": ("--damping", "N_S_PER_M", "Damping beside the spring in N s/m.  [default: 0]"),
-    "normal_load_N": ("--normal-load", "N", "Normal load in N.  [default: weight of the mass]"),
-    "speed_mm_s": ("--speed", "MM_S", "Constant speed of the drive in mm/s."),
+    "mass_kg": ("--mass", "KG", "mass of the slider in kg."),
+    "stiffness_N_per_m": ("--stiffness", "N_PER_M", "stiffness between drive and slider in N/m."),
+    "damping_N_s_per_m": ("--damping", "N_S_PER_M", "damping beside the spring in N s/m.  [default: 0]"),
+    "normal_load_N": ("--normal-load", "N", "normal load in N.  [default: weight of the mass]"),
+    "speed_mm_s": ("--speed", "MM_S", "constant speed of the drive in mm/s."),
 }
 _SLIDER_REST = (
     click.option("--slider", is_flag=True, help="Simulate a rigid slider on a machine, not the spring-block model."),
