@@ -30,7 +30,7 @@ from tribo.diagnostics.model import Acting, Setup, predict, setup
 from tribo.diagnostics.observations import observe
 from tribo.lawsearch.diagnosis_with_laws import explained, searched_laws
 from tribo.lawsearch.grammar import LOAD_TERM, WrittenLaw
-from tribo.lawsearch.known_laws import validate_law
+from tribo.lawsearch.known_laws import KnownLaw, validate_law
 from tribo.lawsearch.model_choice import FoundLaw, centred, without_refuted_causes
 from tribo.lawsearch.scoring import terms_of
 from tribo.lawsearch.search import Discovery
@@ -185,7 +185,8 @@ def _pair(piece: Piece) -> dict[str, Any]:
     later = hide_law(seed, piece.second, piece.seed if same else None)
     kept = later.bench.column("repeat") <= KEPT
     d = examine(as_ingested(later.bench, seed, kept), seed=seed)
-    held = validate_law(without_refuted_causes(explained(d))[0], found.laws[0].law, found.laws[0].parameters)
+    known = KnownLaw("", "", found.laws[0].law, found.laws[0].parameters)
+    held = validate_law(without_refuted_causes(explained(d))[0], known)
     return {
         "answer": held.answer, "second": piece.second, "text": held_sentence(held), "verdict": d.verdict.verdict,
         "strength": round(later.strength, 2),

@@ -91,9 +91,9 @@ def test_a_curve_is_written_and_read_again_and_holds_where_it_is_at_work(curve: 
     assert exact_text(again.law) == exact_text(curve.law)
     assert len(again.law.shapes[0].heights) == KNOTS
     there = baseline(made(two_humps, seed=8, design=DESIGN))
-    assert validate_law(there, again.law, again.parameters).answer == "held"
+    assert validate_law(there, again).answer == "held"
     absent = baseline(made(lambda s: 0.0 * two_humps(s), seed=8, design=DESIGN))
-    assert validate_law(absent, again.law, again.parameters).answer == "not held"
+    assert validate_law(absent, again).answer == "not held"
 
 
 def test_a_curve_without_a_height_at_each_value_or_out_of_order_is_refused(curve: FoundLaw, tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_a_surface_is_written_and_read_again_and_holds_where_it_is_at_work(surfa
     again = read_law(tmp_path / "law.toml")
     assert exact_text(again.law) == exact_text(surface.law)
     there = baseline(made(warm_and_humid, seed=8, design=DESIGN))
-    assert validate_law(there, again.law, again.parameters).answer == "held"
+    assert validate_law(there, again).answer == "held"
 
 
 def test_a_surface_without_a_height_at_every_pair_is_refused(surface: FoundLaw, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ from tribo.lawsearch.grammar import (
     scopes_of,
     shapes_of,
 )
-from tribo.lawsearch.known_laws import law_text, read_law, validate_law, why_not_testable
+from tribo.lawsearch.known_laws import KnownLaw, law_text, read_law, validate_law, why_not_testable
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.lawsearch.search import RESCORED, Discovery, best_of, discover_laws
@@ -296,18 +296,18 @@ def test_faults_of_a_law_are_named_all_at_once(tmp_path: Path) -> None:
 
 
 def test_a_law_holds_where_it_is_at_work_and_not_where_it_is_absent_or_of_other_size(found: Discovery) -> None:
-    law = found.laws[0]
+    law = KnownLaw("", "", found.laws[0].law, found.laws[0].parameters)
     same = baseline(made(warm_is_best, seed=21))
-    assert validate_law(same, law.law, law.parameters).answer == "held"
-    assert validate_law(baseline(made(nothing, seed=22)), law.law, law.parameters).answer == "not held"
+    assert validate_law(same, law).answer == "held"
+    assert validate_law(baseline(made(nothing, seed=22)), law).answer == "not held"
     turned = {**law.parameters, "a": Estimate(*(-x for x in _ends(law.parameters["a"])), "")}
-    assert validate_law(same, law.law, turned).answer == "not held"
+    assert validate_law(same, replace(law, parameters=turned)).answer == "not held"
 
 
 def test_a_law_whose_column_is_not_recorded_cannot_be_told(found: Discovery) -> None:
     law = found.laws[0]
     elsewhere = replace(law.law, shapes=(replace(law.law.shapes[0], column="lot"),))
-    answer = validate_law(baseline(made(nothing, seed=22)), elsewhere, law.parameters)
+    answer = validate_law(baseline(made(nothing, seed=22)), KnownLaw("", "", elsewhere, law.parameters))
     assert answer.answer == "cannot be told"
     assert answer.untested == ("not recorded", ("lot",))
     assert "lot is not recorded" in held_sentence(answer)

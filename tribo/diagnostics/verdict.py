@@ -170,8 +170,8 @@ class AgainstModel:
 
     ``samples`` were measured and the model was calibrated on ``flat``. ``excess`` says how many times its stated error
     the patterned samples differ from the model, and the chance of that; ``wrong_in_form`` are mechanisms that left a
-    misfit in the column they depend on. Of the law search: the answers about ``known`` laws (pairs of KnownLaw and
-    Validation), whether what its laws leave is ``within_chance`` (None without laws), and the searches ``across``
+    misfit in the column they depend on. Of the law search: the ``known`` laws with their answers (KnownLaw), whether
+    what its laws leave is ``within_chance`` (None without laws), and the searches ``across``
     patterns (LawsAcross). ``in_part`` are the columns that are recorded for some tests only (RecordedInPart).
     """
 

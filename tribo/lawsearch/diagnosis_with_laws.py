@@ -17,7 +17,7 @@ from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
 from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
-from tribo.lawsearch.known_laws import KnownLaw, Validation, law_layer, validate_law, validate_laws
+from tribo.lawsearch.known_laws import KnownLaw, law_layer, validate_law, validate_laws
 from tribo.lawsearch.model_choice import levels_of_cause, without_refuted_causes
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
@@ -52,7 +52,7 @@ def with_laws(
     with_known, answers, held, replaced = validate_laws(standing, known, rng)
     if answers:
         d = replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, known=answers)))
-    settled = {name for law, told in answers if told.answer == "held" for name in law.law.columns}
+    settled = {name for law in answers if law.answer == "held" for name in law.law.columns}
     level, of_nuisance = d.share_of_level * level, level
     found = discover_laws(with_known, level=LEVEL_OF_LAWS * level, rng=rng, progress=progress, without=settled)
     idle_beside: tuple[str, ...] = ()
@@ -115,12 +115,10 @@ def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress:
     return replace(found, of_causes=forms)
 
 
-def validate_on_campaign(
-    ingested: Ingested, known: KnownLaw, *, seed: int = 0, level: float = 0.01
-) -> Validation:
-    """Whether a law of another campaign holds in this one, its own causes taken into account."""
+def validate_on_campaign(ingested: Ingested, known: KnownLaw, *, seed: int = 0, level: float = 0.01) -> KnownLaw:
+    """A law of another campaign with the answer of this one, whose own causes are taken into account."""
     model, _, _ = without_refuted_causes(explained(examine(ingested, seed=seed, level=level)))
-    return validate_law(model, known.law, known.parameters)
+    return validate_law(model, known)
 
 
 def explained(d: Diagnosis) -> ModelFit:

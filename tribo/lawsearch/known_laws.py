@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
@@ -149,14 +149,28 @@ def law_text(law: WrittenLaw, parameters: Mapping[str, Estimate], found_in: str)
     return "\n".join(lines) + "\n"
 
 
+Answer = Literal["held", "not held", "cannot be told"]
+# why a law cannot be tested, and the columns that this concerns
+Untested = tuple[Literal["not recorded", "not varied", "no such sample", "no effect"], tuple[str, ...]]
+SURE = 2.58  # standard errors: both decisions are at 1 %
+SHOWS = 4.0  # standard errors that the effect must have for its absence to be certain
+
+
 @dataclass(frozen=True)
 class KnownLaw:
-    """A law of an earlier campaign: the ``name`` of its file, the title of the campaign, and its parameters."""
+    """A law of an earlier campaign: the ``name`` of its file, the title of the campaign, and its parameters.
+
+    Once it was tested on another campaign it has the ``answer``, its amplitudes ``found`` there by name, and why it
+    could not be tested (``untested``).
+    """
 
     name: str
     found_in: str
     law: WrittenLaw
     parameters: Mapping[str, Estimate]
+    answer: Answer | None = None
+    found: Mapping[str, Estimate] = field(default_factory=dict)
+    untested: Untested | None = None
 
 
 def read_law(path: Path) -> KnownLaw:
@@ -183,29 +197,8 @@ def read_law(path: Path) -> KnownLaw:
     return KnownLaw(path.name, table.found_in, law, parameters)
 
 
-Answer = Literal["held", "not held", "cannot be told"]
-# why a law cannot be tested, and the columns that this concerns
-Untested = tuple[Literal["not recorded", "not varied", "no such sample", "no effect"], tuple[str, ...]]
-SURE = 2.58  # standard errors: both decisions are at 1 %
-SHOWS = 4.0  # standard errors that the effect must have for its absence to be certain
-
-
-@dataclass(frozen=True)
-class Validation:
-    """The ``answer`` on one campaign, the amplitude found there beside the earlier one.
-
-    ``parameters`` are all amplitudes by name, here and earlier; ``untested`` says why the law could not be tested.
-    """
-
-    answer: Answer
-    found: Estimate | None
-    earlier: Estimate
-    untested: Untested | None = None
-    parameters: tuple[tuple[str, Estimate, Estimate], ...] = ()
-
-
-def validate_law(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tried: int = 1) -> Validation:
-    """Fit the amplitude of a law, its form as written, on a campaign that it was not made from.
+def validate_law(model: ModelFit, known: KnownLaw, tried: int = 1) -> KnownLaw:
+    """The law with its answer: its amplitude fitted, its form as written, on a campaign that it was not made from.
 
     It held if the amplitude is beyond chance (1 % over all laws ``tried``) and differs from the earlier one by less
     than 2.58 standard errors of the difference; of a wave, both amplitudes. The form may be wrong by a share of the
@@ -213,30 +206,29 @@ def validate_law(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimat
     out unless they explain the campaign clearly better than the law (:func:`without_rivals`). Nothing can be told where
     a column is missing or does not vary, or the effect is below four standard errors in this design.
     """
-    c, a0 = model.setup.observations.conditions, earlier["a"]
+    c, law = model.setup.observations.conditions, known.law
     if (why := why_not_testable(c, law)) or not np.any(law.weight(c)):
-        return Validation("cannot be told", None, a0, why or ("no such sample", ()))
+        return replace(known, answer="cannot be told", untested=why or ("no such sample", ()))
     acting = Acting(law.mechanism())
-    names = [p.name for p in acting.mechanism.parameters]
-    before = [earlier[name] for name in names]
-    if np.abs(effect_of(model.setup, model.law, acting, np.array([e.value for e in before]))).max() < 1e-9:
-        return Validation("cannot be told", None, a0, ("no effect", ()))
+    before = {p.name: known.parameters[p.name] for p in acting.mechanism.parameters}
+    values = np.array([e.value for e in before.values()])
+    if np.abs(effect_of(model.setup, model.law, acting, values)).max() < 1e-9:
+        return replace(known, answer="cannot be told", untested=("no effect", ()))
     model, _ = without_rivals(model, law)
     after = fit(model.setup, (*model.acting, acting), start=model)
-    found = [Estimate(*ends, a0.unit) for ends in recovered(after, len(after.acting) - 1)]
-    beyond = max(np.sign(e0.value) * e.value / _error(e) for e, e0 in zip(found, before, strict=True))
-    wrong_form = FORM * float(np.linalg.norm([e.value for e in before]))
+    here = [Estimate(*ends, known.parameters["a"].unit) for ends in recovered(after, len(after.acting) - 1)]
+    known = replace(known, found=dict(zip(before, here, strict=True)))
+    both = list(zip(here, before.values(), strict=True))
+    beyond = max(np.sign(e0.value) * e.value / _error(e) for e, e0 in both)
+    wrong_form = FORM * float(np.linalg.norm(values))
     alike = all(
-        abs(e.value - e0.value) < SURE * np.linalg.norm([_error(e), _error(e0), wrong_form])
-        for e, e0 in zip(found, before, strict=True)
+        abs(e.value - e0.value) < SURE * np.linalg.norm([_error(e), _error(e0), wrong_form]) for e, e0 in both
     )
-    parameters = tuple(zip(names, found, before, strict=True))
     by_chance = float(-ndtri(0.005 / tried))  # standard errors that one of the laws exceeds in 1 % (Bonferroni)
     if beyond > by_chance and alike:
-        return Validation("held", found[0], a0, None, parameters)
-    if max(abs(e0.value) / _error(e) for e, e0 in zip(found, before, strict=True)) < SHOWS:
-        return Validation("cannot be told", found[0], a0, None, parameters)
-    return Validation("not held", found[0], a0, None, parameters)
+        return replace(known, answer="held")
+    shows = max(abs(e0.value) / _error(e) for e, e0 in both) >= SHOWS
+    return replace(known, answer="not held" if shows else "cannot be told")
 
 
 def _error(e: Estimate) -> float:
@@ -276,29 +268,29 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
 
 def validate_laws(
     model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator
-) -> tuple[ModelFit, tuple[tuple[KnownLaw, Validation], ...], tuple[Layer, ...], dict[str, float]]:
+) -> tuple[ModelFit, tuple[KnownLaw, ...], tuple[Layer, ...], dict[str, float]]:
     """Test every law on a fitted campaign; those that held are added, the surest first, while they hold beside the
     others. A column has one law; a cause that explains the campaign as well stays in its place.
 
     Returns
     -------
     model, answers, layers, replaced
-        The model with the laws that were added, the answer about each law, the layers of those added, and the causes of
+        The model with the laws that were added, each law with its answer, the layers of those added, and the causes of
         the same columns that explain the campaign less well, each with the log likelihood by which the law is better.
     """
-    answers = {k.name: validate_law(model, k.law, k.parameters, len(known)) for k in known}
+    answers = tuple(validate_law(model, k, len(known)) for k in known)
     layers: list[Layer] = []
     replaced: dict[str, float] = {}
     taken: set[str] = set()
 
     def strength(k: KnownLaw) -> float:  # how surely it held, in half widths of its interval
-        found = answers[k.name].found
+        found = k.found.get("a")
         return abs(found.value) / max(found.high - found.low, 1e-12) if found is not None else 0.0
 
-    for k in sorted(known, key=strength, reverse=True):
-        if answers[k.name].answer != "held" or taken & set(k.law.columns):
+    for k in sorted(answers, key=strength, reverse=True):
+        if k.answer != "held" or taken & set(k.law.columns):
             continue
-        if layers and validate_law(model, k.law, k.parameters, len(known)).answer != "held":
+        if layers and validate_law(model, k, len(known)).answer != "held":
             continue
         without, rivals = without_rivals(model, k.law)
         if any(by <= 0.0 for by in rivals.values()):
@@ -308,7 +300,7 @@ def validate_laws(
         taken |= set(k.law.columns)
         replaced |= rivals
         model = after
-    return model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced
+    return model, answers, tuple(layers), replaced
 
 
 def law_layer(

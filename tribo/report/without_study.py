@@ -27,7 +27,7 @@ from tribo.wording.part_sentences import layer_sentence
 if TYPE_CHECKING:
     from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
     from tribo.lawsearch.across_patterns import LawsAcross
-    from tribo.lawsearch.known_laws import Validation
+    from tribo.lawsearch.known_laws import KnownLaw
     from tribo.lawsearch.search import Discovery
 
 
@@ -67,10 +67,11 @@ def law_texts(d: Discovery, title: str) -> dict[str, str]:
     return {f"law-{k}.toml": law_text(found.law, found.parameters, title) for k, found in enumerate(d.laws, start=1)}
 
 
-def write_validation(held: Validation, out: Path, provenance: Provenance) -> tuple[dict[str, Any], str]:
+def write_validation(held: KnownLaw, out: Path, provenance: Provenance) -> tuple[dict[str, Any], str]:
     """discovery.json of the test of one law, and provenance.json; returns the record and the same in words."""
     text = held_sentence(held)
-    own = {"answer": held.answer, "found": plain(held.found), "earlier": plain(held.earlier), "text": text}
+    found, earlier = (plain(amplitudes.get("a")) for amplitudes in (held.found, held.parameters))
+    own = {"answer": held.answer, "found": found, "earlier": earlier, "text": text}
     record: dict[str, Any] = {"schema": SCHEMA, **own}
     write_results({RECORD: record}, out, provenance, "discover")
     return record, text

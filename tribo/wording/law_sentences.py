@@ -11,7 +11,7 @@ from tribo.diagnostics.verdict import Estimate
 from tribo.lawsearch.across_patterns import LawsAcross, formula
 from tribo.lawsearch.diagnosis_with_laws import CERTAIN, Difference
 from tribo.lawsearch.grammar import ALL, BOTH, CAVITY_SHARE, ELONGATION, FLAT, PATTERNED, RIM, Shape, T, WrittenLaw
-from tribo.lawsearch.known_laws import SHOWS, PlannedLaw, Untested, Validation
+from tribo.lawsearch.known_laws import SHOWS, KnownLaw, PlannedLaw, Untested
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.search import Discovery
 from tribo.user_text import plain
@@ -149,8 +149,8 @@ def discovery_sentence(d: Discovery) -> str:
     return f"{' '.join(said)} {d.searched} laws were tried."
 
 
-def held_sentence(h: Validation) -> str:
-    """Whether a law of another campaign held in this one."""
+def held_sentence(h: KnownLaw) -> str:
+    """Whether a law of another campaign held in this one, where it was tested."""
     if h.untested is not None:
         return "The law changes nothing in this design." if h.untested[0] == "no effect" else (
             f"The law cannot be tested here: {untested_clause(h.untested)}."
@@ -158,11 +158,12 @@ def held_sentence(h: Validation) -> str:
     opening = {
         "held": "The law held", "not held": "The law did not hold",
         "cannot be told": "This campaign is too small to test the law",
-    }[h.answer]  # fmt: skip
+    }[str(h.answer)]  # fmt: skip
     both = (
         f"{name} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g}) here, {e0.value:.3g} ({e0.low:.3g} to {e0.high:.3g}) "
         "before"
-        for name, e, e0 in h.parameters
+        for name, e in h.found.items()
+        for e0 in [h.parameters[name]]
     )
     return f"{opening}: {'; '.join(both)}."
 

@@ -27,6 +27,7 @@ from tribo.diagnostics.verdict import (
     Verdict,
 )
 from tribo.diagnostics.without_model import ColumnsTested
+from tribo.lawsearch.known_laws import KnownLaw
 from tribo.mechanisms.record import TraceEvidence
 from tribo.user_text import plain
 from tribo.vocabulary import OBSERVABLES, described, in_words, short_label
@@ -117,11 +118,11 @@ def worded(v: Verdict) -> Verdict:
     return replace(v, text=f"{v.sentence} {v.evidence}")
 
 
-def _known_laws(known: Sequence[tuple[Any, Any]]) -> list[dict[str, str]]:
+def _known_laws(known: Sequence[KnownLaw]) -> list[dict[str, str]]:
     return [
-        {"law": k.name, "found_in": k.found_in, "formula": k.law.formula(), "answer": held.answer,
-         "text": held_sentence(held)}
-        for k, held in known
+        {"law": k.name, "found_in": k.found_in, "formula": k.law.formula(), "answer": str(k.answer),
+         "text": held_sentence(k)}
+        for k in known
     ]  # fmt: skip
 
 
@@ -313,7 +314,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
         )
     yield from in_part_sentences(shows.in_part)
     if shows.known:
-        held = sum(answer.answer == "held" for _, answer in shows.known)
+        held = sum(law.answer == "held" for law in shows.known)
         yield f"{held} of {len(shows.known)} known laws held."
     for law in laws:
         if law is not stated:
