@@ -178,7 +178,7 @@ def _candidates(campaign: Campaign) -> Iterator[LikelySlip]:
     for column, ways in _LOADS.items():
         if stated == {column}:
             for words, change in ways:
-                yield _of_loads(campaign, f"{column} looks like {words}", change)
+                yield _of_loads(campaign, f"{column or 'the normal force'} looks like {words}", change)
     if "mass_g" in stated and campaign.slider_mass_kg > 0:
         slider = campaign.slider_mass_kg * STANDARD_GRAVITY
         loads = _loads(campaign)

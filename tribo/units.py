@@ -118,6 +118,10 @@ QUANTITIES: dict[str, Quantity] = {
             rotary velocity, predkosc obrotowa, obroty, otacky, pyorimisnopeus, varvtal,
             скорость вращения, 转速, 回転数, 回転速度, 회전수
         """),
+        _quantity("frequency", "f", "Hz", "frequency_Hz", """
+            frequency, oscillation frequency, stroke frequency, freq, frequenz, frequence, frecuencia, frequenza,
+            frequencia, czestotliwosc, частота, 频率, 周波数, 振动频率, 주파수
+        """),
         _quantity("radius", "r", "m", "radius_m", """
             radius, track radius, wear track radius, disc track radius, sliding radius, bahnradius, laufradius, rayon,
             raggio, radio, promien, polomer, радиус, 半径, 반경

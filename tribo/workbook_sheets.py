@@ -4,13 +4,17 @@ asks for more memory or time than it may have ends this process and no other. It
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import datetime
 import io
 import json
 import sys
+from typing import Any
 
 MOST_MEMORY_BYTES = 2_000_000_000
+MOSTLY = 9  # numbers to one date, from which a column is one of numbers
+DAY_THAT_WAS_NOT = 61  # from it on, workbooks count the 29th of February 1900
 
 
 def main() -> None:
@@ -25,8 +29,21 @@ def main() -> None:
     texts = {}
     for name in book.sheet_names:
         rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+        numbers_shown_as_dates(rows)
         texts[name] = "\n".join("\t".join(map(cell_text, row)) for row in rows) + "\n"
     sys.stdout.buffer.write(json.dumps(texts).encode("ascii"))
+
+
+def numbers_shown_as_dates(rows: list[list[Any]]) -> None:
+    """A date in a column of numbers is a number that the workbook shows so: 12 as 1900-01-12."""
+    numbers = collections.Counter(k for row in rows for k, value in enumerate(row) if isinstance(value, float))
+    dates = collections.Counter(k for row in rows for k, value in enumerate(row) if isinstance(value, datetime.date))
+    for row in rows:
+        for k, value in enumerate(row):
+            if isinstance(value, datetime.date) and numbers[k] > MOSTLY * dates[k]:
+                day = datetime.datetime.combine(value, getattr(value, "time", datetime.time)())
+                serial = (day - datetime.datetime(1899, 12, 30)) / datetime.timedelta(days=1)
+                row[k] = serial - 1.0 if serial < DAY_THAT_WAS_NOT else serial
 
 
 def cell_text(value: object) -> str:

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tribo.drafting.draft import draft_campaign
 from tribo.errors import ReadError
 from tribo.readers import inspect_export, read_blocks, read_export
+from tribo.traces.evaluation import evaluate
 
 N = 120
 TIME = 0.05 * np.arange(N)
@@ -166,3 +168,51 @@ def test_the_serial_monitor_of_a_board_is_a_table_with_its_clock(tmp_path: Path,
     trace = read_export(tmp_path / "a.txt", columns=columns)
     np.testing.assert_allclose(trace.force_N, FRICTION, atol=1e-4)
     np.testing.assert_allclose(trace.time_s, TIME, atol=1e-6)
+
+
+def test_stroke_and_frequency_are_the_mean_speed_of_an_oscillation(tmp_path: Path) -> None:
+    header = "Time [s];Friction coefficient [-];Load [g];Frequency [Hz];Stroke [µm]"
+    stroke = 1000.0 + np.sin(TIME)
+    trace = read_export(saved(tmp_path, header, TIME, 0.1 * FRICTION, np.full(N, 200.0), np.full(N, 50.0), stroke))
+    np.testing.assert_allclose(trace.columns["speed_m_s"], 0.1, rtol=2e-3)
+    assert "no_static" in evaluate(trace).flags  # it slides from its first row
+
+
+def test_the_load_that_was_measured_goes_before_the_one_that_was_set(tmp_path: Path) -> None:
+    measured = 12.0 + 0.05 * np.sin(TIME)
+    path = saved(
+        tmp_path, "X (mm);Fn (N);Measured Fn (N);Ft (N);Time (s)", TIME, np.full(N, 12.0), measured, FRICTION, TIME
+    )
+    np.testing.assert_allclose(read_export(path).columns["normal_force_N"], measured, rtol=1e-4)
+
+
+def test_a_temperature_called_t_is_no_time(tmp_path: Path) -> None:
+    trace = read_export(
+        saved(tmp_path, "T [°C];Elapsed [s];F [N]", 20.0 + TIME, TIME, FRICTION), columns={"time": "Elapsed"}
+    )
+    np.testing.assert_allclose(trace.columns["temperature_C"], 20.0 + TIME, rtol=1e-4)
+
+
+def test_a_number_that_a_workbook_shows_as_a_date_is_a_number(tmp_path: Path) -> None:
+    from openpyxl import Workbook
+
+    book = Workbook()
+    book.active.append(["Time [s]", "Fn [N]", "Ft [N]"])
+    for t, f in zip(TIME, FRICTION, strict=True):
+        book.active.append([t, 12.0, f])
+    book.active.cell(40, 2).number_format = "yyyy-mm-dd"
+    book.active.cell(50, 2).value, book.active.cell(50, 2).number_format = 70.5, "yyyy-mm-dd hh:mm"
+    book.save(tmp_path / "a.xlsx")
+    load = read_export(tmp_path / "a.xlsx").columns["normal_force_N"]
+    assert (load[38], load[48]) == (12.0, 70.5)
+
+
+def test_a_name_of_a_file_with_a_number_sign_keeps_its_recorded_load(tmp_path: Path) -> None:
+    (tmp_path / "raw").mkdir()
+    for name in ("12N-alloy#3.csv", "12N-brass.csv"):
+        saved(tmp_path / "raw", "Time [s];Fn [N];Ft [N]", TIME, np.full(N, 12.0), FRICTION).rename(
+            tmp_path / "raw" / name
+        )
+    draft = draft_campaign(tmp_path / "raw")
+    assert "the normal force is recorded for 2 of 2 rows and is used" in draft.found
+    assert not any("the load of" in text for text in draft.missing)

@@ -12,7 +12,7 @@ import math
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -172,11 +172,11 @@ def draft_campaign(
         for row in _at_radius(list(_rows_of(name, found, named.get(name, {}), records)), name, draft):
             draft.rows.append(row | {c: value for c, value in (filled or {}).items() if not row.get(c)})
     recorded = {f"raw/{name}" for name, found in used.items() if any(map(has_load, found))}
-    in_export = [row["file"].partition("#")[0] in recorded for row in draft.rows]
+    in_export = [_is_of(row["file"], recorded) for row in draft.rows]
     if not all(in_export):
         for row, there in zip(draft.rows, in_export, strict=True):
             # beside rows with a load, a row that leaves it to its export names the record: raw/a.csv#1
-            if there and "#" not in row["file"]:
+            if there and row["file"] in recorded:
                 row["file"] += "#1"
     width = len(str(len(draft.rows)))
     named_so = Counter(row.get("test_id") for row in draft.rows)
@@ -193,6 +193,11 @@ def draft_campaign(
     in_strokes = {row["file"][len("raw/") : -len("#*")] for row in draft.rows if row["file"].endswith("#*")}
     _signs(draft, {name: found for name, found in readable.items() if name not in in_strokes})
     return draft
+
+
+def _is_of(file: str, exports: Collection[str]) -> bool:
+    """Whether the cell of a row names one of the exports, or a record in it; names of files may hold a "#" as well."""
+    return file in exports or file.rpartition("#")[0] in exports
 
 
 def _with_sizes(correction: Correction) -> Correction:
@@ -369,7 +374,7 @@ def started_at(metadata: Mapping[str, str]) -> str:
 
 def _say_what_is_missing(draft: Draft, used: Mapping[str, Sequence[Trace]], speed_given: bool) -> None:
     recorded = {f"raw/{name}" for name, records in used.items() if any(map(has_load, records))}
-    with_load = [r for r in draft.rows if r["file"].partition("#")[0] in recorded]
+    with_load = [r for r in draft.rows if _is_of(r["file"], recorded)]
     if with_load:
         draft.found.append(f"the normal force is recorded for {len(with_load)} of {len(draft.rows)} rows and is used")
     without = [r["file"] for r in draft.rows if r not in with_load and not any(r.get(c) for c in LOADS)]

@@ -28,6 +28,7 @@ _FORCES_OF_NO_KIND = {
 }  # fmt: skip
 _PATH_FOR_TIME_M_S = 1e-3  # 1 mm of path counts as 1 s where neither time nor speed is known
 _STROKES = {"stroke", "hub", "course", "corsa", "curso", "amplitude", "行程", "ストローク", "ход"}
+STROKE = "it is the stroke of an oscillation, no displacement"
 _SAYS_FREQUENCY = re.compile(r"\bfreq|frequenz|frecuencia|czestotliwosc|频率|周波数|частота")
 _SHORTEST_TURN_M = 5e-4  # the track of a pin on a disc is longer
 _SHARE_OF_PATH = 0.01  # of speed times time
@@ -216,9 +217,9 @@ def why_no_path(arrays: Mapping[str, FloatArray], columns: Sequence[Column], nam
     if it is None or not it.reason.startswith("named") or time_follows:
         return ""
     path, time = arrays["displacement"], arrays["time"]
-    oscillates = plain_name(it.label) in _STROKES and any(map(_SAYS_FREQUENCY.search, map(plain_name, names)))
-    if oscillates and np.quantile(np.abs(path), 0.1) > 0.5 * np.abs(path).max():
-        return "it is the stroke of an oscillation, no displacement"
+    oscillates = "frequency" in arrays or any(map(_SAYS_FREQUENCY.search, map(plain_name, names)))
+    if oscillates and plain_name(it.label) in _STROKES and np.quantile(np.abs(path), 0.1) > 0.5 * np.abs(path).max():
+        return STROKE
     moved, steps = float(np.abs(np.diff(path)).sum()), np.abs(np.diff(time))
     for quantity, least_m in (("rotation speed", _SHORTEST_TURN_M), ("speed", _SHARE_OF_PATH)):
         if quantity in arrays and moved < least_m * float((np.abs(arrays[quantity][1:]) * steps).sum()):

@@ -36,11 +36,12 @@ _SAYS_FRICTION = re.compile(
     r"tangential|tangentiel|трени|摩擦力|마찰력"
 )
 _SAYS_SLIDING_SPEED = re.compile(r"sliding (?:speed|velocity)|gleitgeschwindigkeit|vitesse de glissement")
+_MEASURED_BEFORE = re.compile(r"^(?:measured|actual|gemessene?[rs]?)\s+", re.I)
 _SAYS_DEPTH = re.compile(r"\bdepth\b|penetration|indentation|eindring|profondeur|profundidad")
 _SAYS_NORMAL = re.compile(r"\bnorma[al]|normalkraft|normallast|нормальн|法向|垂直力|수직")
 _NO_FORCE = re.compile(r"set ?point|\bset\b|target|soll|limit|max|min|\bstd\b|\bsd\b|deviation|error|zero|offset")
 _CLOCK_OF_RATE = re.compile(r"^(?:zeit|time|temps)\b.*rate$")  # "Zeit  1 - Standardmessrate"
-_ONLY_WITH_UNIT = ("radius", "normal stress", "shear stress")  # of no use without one, and missed by nobody
+_ONLY_WITH_UNIT = ("radius", "frequency", "normal stress", "shear stress")  # of no use without
 _A_RATIO = re.compile(
     r"\b(?:cof|coeff?|coefficient|koeffizient|coefficiente?)\b|friction factor|reibwert|reibzahl|摩擦[係系]数"
 )
@@ -347,7 +348,12 @@ def _matches(
         for index, name in enumerate(names)
         if name and index not in taken | raw and filled[index] and (hit := match_column(name))
     }
-    for index in sorted({*range(len(names))} - taken - set(hits)):
+    bare = [split_unit(name)[0] for name in names]
+    for index in sorted({*range(len(names))} - taken - raw - set(hits)):
+        beside = _MEASURED_BEFORE.sub("", bare[index])
+        if filled[index] and beside in bare and beside != bare[index] and (hit := match_quantity(beside)):
+            hits[index] = (hit[0], hit[1] - 1)  # before the same without that word: what was set
+            continue
         if filled[index] and names[index] and (hit := by_a_word(names[index], _unit_of(names, units, index))):
             hits[index] = hit
     there = asked | {quantity for quantity, _ in hits.values()}

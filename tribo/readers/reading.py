@@ -15,6 +15,7 @@ from tribo.input_files import OLD_EXCEL, ZIP, sheets_as_text
 from tribo.readers.binary_machines import BINARY_MACHINES
 from tribo.readers.checks import (
     NO_TIME,
+    STROKE,
     Arrays,
     beyond_measurement,
     check_scale,
@@ -378,10 +379,14 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
     if impossible:
         return ReadError(impossible)
     if no_path := why_no_path(arrays, columns, layout.names):
-        del arrays["displacement"]
         (it,) = (c for c in columns if c.quantity == "displacement")
         columns = tuple(c for c in columns if c is not it)
         passed_over[it.index] = no_path
+        stroke = arrays.pop("displacement")
+        if no_path == STROKE and "frequency" in arrays and "speed" not in arrays:
+            arrays["speed"] = 2.0 * stroke * arrays["frequency"]
+            reason = "mean speed: twice the stroke times the frequency"
+            columns = (*columns, Column("speed", -1, it.label, 1.0, 0.0, reason))
     arrays["time"], coarse = spread_over_ticks(arrays["time"], source.file, labels["time"], row_of)
     findings = coarse + check_time(arrays["time"], source.file, labels["time"], row_of)
     load = arrays.get("normal force")
