@@ -5,18 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tribo.diagnostics import examine, residual_table, with_simulation
 from tribo.diagnostics.diagnosis import Diagnosis
+from tribo.diagnostics.effect_sizes import rms_percent
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.predictor import flat_law
 from tribo.diagnostics.simulated_extension import (
     MOST_LOADS,
-    SimulatedExtension,
     local_friction,
+    ratio_of_effects,
     representatives,
-    residual_percent,
 )
 from tribo.springblock import SimConfig, simulate
 from tribo.wording.verdict_sentences import worded
@@ -37,17 +38,20 @@ def hot() -> Diagnosis:
     return with_simulation(found)
 
 
-def simulated(d: Diagnosis) -> SimulatedExtension:
-    assert d.simulated is not None
-    return d.simulated
+def simulated(d: Diagnosis) -> tuple[np.ndarray, pd.DataFrame]:
+    assert d.simulated_log_force is not None
+    assert d.extended_runs is not None
+    return d.simulated_log_force, d.extended_runs
 
 
 def test_a_gain_on_every_block_is_the_gain_of_the_sample(hot: Diagnosis) -> None:
-    e = simulated(hot)
-    assert e.mechanisms == ("temperature",)
-    assert e.ratio == pytest.approx(1.0, abs=0.02)
-    assert e.off_percent < 1.0
-    assert e.change == pytest.approx(e.quick, abs=0.02)
+    log_force, table = simulated(hot)
+    assert hot.named is not None
+    assert [a.name for a in hot.named.model.acting] == ["temperature"]
+    assert ratio_of_effects(table)[0] == pytest.approx(1.0, abs=0.02)
+    off = table[["simulated_static", "simulated_sliding"]].to_numpy() - table[["quick_static", "quick_sliding"]]
+    assert float(np.sqrt(np.mean(off.to_numpy() ** 2))) < 0.01
+    assert log_force == pytest.approx(hot.named.model.predicted, abs=0.02)
 
 
 def test_few_tests_are_simulated_and_the_most_moved_is_among_them(hot: Diagnosis) -> None:
@@ -65,8 +69,9 @@ def test_the_verdict_says_what_was_simulated_and_whose_shares_it_used(hot: Diagn
     assert "in the simulator itself" in v.text
     model = v.as_dict()["model"]
     assert model["simulated"]["mechanisms"] == ["temperature"]
-    before, quick, after = residual_percent(hot, simulated(hot))
-    assert model["simulated"]["rms_percent_simulated"] == pytest.approx(after)
+    before, quick, after = (model["simulated"][f"rms_percent_{name}"] for name in ("before", "law", "simulated"))
+    left = hot.baseline.setup.observations.log_force - simulated(hot)[0]
+    assert after == pytest.approx(rms_percent(left))
     assert after < before
     assert after == pytest.approx(quick, rel=0.05)
 
@@ -74,12 +79,13 @@ def test_the_verdict_says_what_was_simulated_and_whose_shares_it_used(hot: Diagn
 def test_the_residual_table_carries_the_simulated_force(hot: Diagnosis) -> None:
     rows = residual_table(hot)
     static = rows[rows["regime"] == "static"]
-    assert np.log(static["simulated_N"]).to_numpy() == pytest.approx(simulated(hot).log_force[:, 0])
+    assert np.log(static["simulated_N"]).to_numpy() == pytest.approx(simulated(hot)[0][:, 0])
 
 
 def test_nothing_named_means_nothing_simulated(once: Once) -> None:
     d = with_simulation(examined("nothing", once))
-    assert d.simulated is None
+    assert d.simulated_log_force is None
+    assert d.extended_runs is None
     assert "simulated" not in d.verdict.as_dict()["model"]
 
 
@@ -105,7 +111,7 @@ def test_a_diagnosis_with_its_simulation_can_be_kept_and_read_back(hot: Diagnosi
 
     again = decoded(json.loads(json.dumps(encoded(hot))))
     assert again.verdict.to_json() == hot.verdict.to_json()
-    assert simulated(again).table.equals(simulated(hot).table)
+    assert simulated(again)[1].equals(simulated(hot)[1])
 
 
 def test_a_simulation_that_fails_is_reported_with_its_reason(hot: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,8 +122,8 @@ def test_a_simulation_that_fails_is_reported_with_its_reason(hot: Diagnosis, mon
         raise SimulationError(Problem("not_finite", "the force is not finite"))
 
     monkeypatch.setattr(simulated_extension, "simulate_pair", fails)
-    d = with_simulation(replace(hot, simulated=None))
-    assert d.simulated is None
+    d = with_simulation(replace(hot, simulated_log_force=None, extended_runs=None))
+    assert d.simulated_log_force is None
     assert d.verdict.as_dict()["model"]["not_simulated"] == {
         "mechanisms": ["temperature"],
         "reason": "the force is not finite",

@@ -24,12 +24,11 @@ from tribo.diagnostics.scatter import held_still
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
 from tribo.diagnostics.verdict import Excluded, Verdict
 from tribo.display import displayed
-from tribo.records import REGIMES, Ingested
+from tribo.records import REGIMES, FloatArray, Ingested
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tribo.diagnostics.simulated_extension import SimulatedExtension
     from tribo.lawsearch.search import Discovery
 
 REPLICATES = 120
@@ -49,16 +48,18 @@ class DiagnosisWithoutModel:
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
-    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible; ``laws`` is
-    the search for the laws of what the causes leave, where something was left. ``share_of_level`` is
-    that of the level of a misfit at which the verdict was made: less than one where days and drift are certain.
+    Where the extended model was run in the simulator itself, ``simulated_log_force`` (n, 2) is ln T of every test by it
+    and ``extended_runs`` has one row a pair of runs. ``laws`` is the search for the laws of what the causes leave,
+    where something was left. ``share_of_level`` is that of the level of a misfit at which the verdict was made: less
+    than one where days and drift are certain.
     """
 
     verdict: Verdict
     baseline: ModelFit
     screened: Screen
     named: Named | None
-    simulated: SimulatedExtension | None = None
+    simulated_log_force: FloatArray | None = None
+    extended_runs: pd.DataFrame | None = None
     laws: Discovery | None = None
     share_of_level: float = 1.0
 
@@ -186,7 +187,8 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
     parts = []
     for k, regime in enumerate(REGIMES):
         measured, before, after = o.log_force[:, k], d.baseline.predicted[:, k], extended.predicted[:, k]
-        simulated = {} if d.simulated is None else {"simulated_N": np.exp(d.simulated.log_force[:, k])}
+        of_runs = d.simulated_log_force
+        simulated = {} if of_runs is None else {"simulated_N": np.exp(of_runs[:, k])}
         parts.append(
             pd.DataFrame(
                 {

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,6 @@ from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.predictor import flat_law
 from tribo.diagnostics.verdict import CERTAIN_CAUSES
-from tribo.display import displayed
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Values
 from tribo.mechanisms_in_model import simulate_pair
@@ -42,36 +41,12 @@ Progress = Callable[[str, int, int], None]
 STAGE = "simulating the extended model"
 
 
-@displayed(lambda s: ", ".join(s.mechanisms))
-@dataclass(frozen=True)
-class SimulatedExtension:
-    """What the spring-block model itself gives with the named mechanisms in it.
-
-    ``log_force`` (n, 2) is ln T of every test by the extended model with the simulated effect, ``change`` (n, 2) that
-    effect and ``quick`` (n, 2) the effect by the laws. ``table`` has one row a pair of runs. ``ratio`` is the simulated
-    over the quick effect, least squares over the pairs, with its standard error.
-    """
-
-    mechanisms: tuple[str, ...]
-    log_force: FloatArray
-    change: FloatArray
-    quick: FloatArray
-    table: pd.DataFrame
-    ratio: float
-    ratio_u: float
-
-    @property
-    def off_percent(self) -> float:
-        """Root mean square of simulated less quick effect over the pairs, percent of T."""
-        left = self.table[["simulated_static", "simulated_sliding"]].to_numpy()
-        right = self.table[["quick_static", "quick_sliding"]].to_numpy()
-        return float(100 * np.sqrt(np.mean((left - right) ** 2)))
-
-
 def simulate_extension(
     model: ModelFit, *, seed: int = 0, jobs: int = 2, progress: Progress | None = None
-) -> SimulatedExtension | str:
+) -> tuple[FloatArray, pd.DataFrame] | str:
     """The model of a campaign with its mechanisms in the simulator, or the reason why it was not simulated.
+
+    Returns ln T of every test (n, 2) by the model with the simulated effect, and a table with one row a pair of runs.
 
     Parameters
     ----------
@@ -95,10 +70,7 @@ def simulate_extension(
     except SimulationError as why:
         return "; ".join(str(problem) for problem in why.problems)
     table = _table(model, picked, quick, runs)
-    change = interpolated(model, picked, table, quick)
-    return SimulatedExtension(
-        tuple(a.name for a in model.acting), model.predicted - quick + change, change, quick, table, *_ratio(table)
-    )
+    return model.predicted - quick + interpolated(model, picked, table, quick), table
 
 
 def representatives(model: ModelFit, quick: FloatArray) -> list[int]:
@@ -205,7 +177,7 @@ def interpolated(model: ModelFit, tests: Sequence[int], table: pd.DataFrame, qui
     return change
 
 
-def _ratio(table: pd.DataFrame) -> tuple[float, float]:
+def ratio_of_effects(table: pd.DataFrame) -> tuple[float, float]:
     """Least squares ratio of simulated to quick change over all pairs and regimes, and its standard error."""
     x = table[["quick_static", "quick_sliding"]].to_numpy().ravel()
     y = table[["simulated_static", "simulated_sliding"]].to_numpy().ravel()
@@ -232,19 +204,14 @@ def with_simulation(
     if isinstance(extension, str):
         model["not_simulated"] = {"mechanisms": [a.name for a in d.named.model.acting], "reason": extension}
         return replace(d, verdict=replace(d.verdict, model=model))
-    before, quick, after = residual_percent(d, extension)
-    model["simulated"] = {
-        "mechanisms": list(extension.mechanisms), "pairs_of_runs": len(extension.table),
-        "effect_over_law": extension.ratio, "effect_over_law_u": extension.ratio_u, "rms_percent_before": before,
-        "rms_percent_law": quick, "rms_percent_simulated": after,
-    }  # fmt: skip
-    return replace(d, simulated=extension, verdict=replace(d.verdict, model=model))
-
-
-def residual_percent(d: Diagnosis, extension: SimulatedExtension) -> tuple[float, float, float]:
-    """Root mean square of 100 (measured / modelled T - 1): calibrated, extended by law, and by the simulator."""
-    assert d.named is not None
+    log_force, table = extension
+    ratio, ratio_u = ratio_of_effects(table)
     measured = d.baseline.setup.observations.log_force
-    left = (d.baseline.residual, d.named.model.residual, measured - extension.log_force)
-    before, quick, after = (rms_percent(part) for part in left)
-    return before, quick, after
+    model["simulated"] = {
+        "mechanisms": [a.name for a in d.named.model.acting], "pairs_of_runs": len(table),
+        "effect_over_law": ratio, "effect_over_law_u": ratio_u,
+        "rms_percent_before": rms_percent(d.baseline.residual),
+        "rms_percent_law": rms_percent(d.named.model.residual),
+        "rms_percent_simulated": rms_percent(measured - log_force),
+    }  # fmt: skip
+    return replace(d, simulated_log_force=log_force, extended_runs=table, verdict=replace(d.verdict, model=model))

@@ -50,8 +50,8 @@ def extended_numbers(d: Diagnosis) -> pd.DataFrame:
     f = d.baseline
     o = f.setup.observations
     residuals = {"before": f.residual, "after": d.named.model.residual}
-    if d.simulated is not None:
-        residuals["simulated"] = o.log_force - d.simulated.log_force
+    if d.simulated_log_force is not None:
+        residuals["simulated"] = o.log_force - d.simulated_log_force
     levels = findings.load_levels(o.conditions.normal_load_N)
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     rows = [

@@ -89,9 +89,9 @@ def write_store(
         groups["/comparison"] = groups["/comparison"][0], {"flat": study.comparison.flat}
     if study.simulated is not None:
         groups["/simulated"] = _table(study.simulated, "run"), {}
-    if diagnosis is not None and diagnosis.simulated is not None:
-        mechanisms = {"mechanisms": ", ".join(diagnosis.simulated.mechanisms)}
-        groups["/extended_runs"] = _table(diagnosis.simulated.table, "pair"), mechanisms
+    if diagnosis is not None and diagnosis.named is not None and diagnosis.extended_runs is not None:
+        mechanisms = {"mechanisms": ", ".join(a.name for a in diagnosis.named.model.acting)}
+        groups["/extended_runs"] = _table(diagnosis.extended_runs, "pair"), mechanisms
     if keep_earlier:
         renewed = OF_DIAGNOSIS if diagnosis is not None else ()
         groups = {name: group for name, group in _earlier(out / "campaign.nc").items() if name not in renewed} | groups
