@@ -72,7 +72,7 @@ def change(m: Mechanism, values: Values, c: Conditions, choice: str) -> list[Any
 
 
 def acts(m: Mechanism, c: Conditions, choice: str, test: int) -> list[Any]:
-    here = m.on_test(m.start(), choice, c, test)
+    here = m.choosing.on_test(m.start(), choice, c, test)
     return [] if here is None else list(here)
 
 

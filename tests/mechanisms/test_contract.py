@@ -140,7 +140,7 @@ def test_it_has_a_plain_name_of_its_own_and_no_identifier_in_its_words(m: Mechan
 def test_a_choice_concerns_some_test_and_is_called_by_the_name_of_the_mechanism(m: Mechanism) -> None:
     c = conditions()
     choice = first_choice(m, base(c), c)
-    acting = [m.on_test(m.start(), choice, c, test) for test in range(48)]
+    acting = [m.choosing.on_test(m.start(), choice, c, test) for test in range(48)]
     assert any(here is not None for here in acting)
     assert all(here is None or len(here[0]) == len(m.parameters) for here in acting)
     assert m.called(choice).split(":")[0] == m.name
@@ -158,7 +158,7 @@ def test_on_one_test_it_changes_the_force_as_its_law_does_over_the_campaign(m: M
     whole = m.law(m.start(), b, c, choice).static_N
     plain = b.forces(c.normal_load_N).static_N
     for test in range(48):
-        here = m.on_test(m.start(), choice, c, test)
+        here = m.choosing.on_test(m.start(), choice, c, test)
         if here is None:
             assert whole[test] == pytest.approx(plain[test])
             continue

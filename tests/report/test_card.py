@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html as html_text
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -219,7 +219,7 @@ def test_page_terminal_and_file_hold_the_same_card(written: Written, study: Stud
     assert card.next_test is not None
     assert card.next_test["why"] in page
     kept = json.loads((written.out / "card.json").read_text(encoding="utf-8"))
-    assert kept == json.loads(json.dumps(card_of(study, None).as_dict()))
+    assert kept == json.loads(json.dumps(asdict(card_of(study, None))))
 
 
 def test_intervals_of_a_combined_fit_take_the_degrees_of_freedom_of_both_parts(study: Study) -> None:

@@ -205,7 +205,7 @@ def diagnose(
         verdict = found.verdict
         card = card_of(stages.with_fits(study), verdict)
         write_until(study, out, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
-    console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
+    console.result(verdict.as_dict() | {"card": asdict(card)}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
     console.list_doubts(study.doubts)
     return console.status_after(study.ingested.set_aside)
 
@@ -298,7 +298,7 @@ def demo(console: Console, out: Path, **options: Any) -> int:
     both[out / SECOND] = seconds[0]
     page = write_demo_page(out)
     reports = {folder / "report.html": card for folder, (_, card) in both.items()}
-    record = {"out": str(out), "page": str(page), "cards": {str(r): card.as_dict() for r, card in reports.items()}}
+    record = {"out": str(out), "page": str(page), "cards": {str(r): asdict(card) for r, card in reports.items()}}
     console.result(record, "\n\n".join(f"{path}\n{card_text(card)}" for path, card in reports.items()))
     console.say(f"open {page}")
     return max(status for status, _ in both.values())
@@ -392,7 +392,7 @@ def _conclude(
         "outlying": list(study.outlying),
         "differences": [] if study.differences is None else study.differences.to_dict("records"),
         "verdict": verdict.verdict if verdict else None,
-        "card": card.as_dict() if card else None,
+        "card": asdict(card) if card else None,
     }
     words = [
         card_text(card) if card else "", table2_text(study) if study.fits else "", summary_text(study),

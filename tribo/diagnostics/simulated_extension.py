@@ -112,7 +112,7 @@ def _pair(model: ModelFit, test: int, seed: int) -> tuple[SimConfig, dict[str, V
     )  # fmt: skip
     at_work: dict[str, Values] = {}
     for acting, values in zip(model.acting, model.values, strict=True):
-        here = acting.mechanism.on_test(values, acting.choice, c, test)
+        here = acting.mechanism.choosing.on_test(values, acting.choice, c, test)
         if here is not None:  # the choice concerns this test
             name, (of_test, other_sample) = acting.mechanism.name, here
             at_work[f"{name}({other_sample})" if other_sample else name] = of_test

@@ -371,10 +371,6 @@ class Mechanism:
         """The recorded column or columns that it follows."""
         return self.choosing.column or self.choosing.label(choice) or choice or ", ".join(self.needs)
 
-    def on_test(self, values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
-        """How it acts on one test; None where the choice does not concern that test."""
-        return self.choosing.on_test(values, choice, conditions, test)
-
     def zero(self) -> Values:
         """MechanismParameter values at which the mechanism is absent."""
         return np.array([self.amplitude.zero, *(p.zero if p.amplitude else p.start for p in self.parameters[1:])])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.resources import files
 from typing import Any
@@ -138,7 +139,7 @@ def _table2(table: Mapping[str, Any], intercept: str) -> list[dict[str, Any]]:
 
 def _card(card: Card) -> dict[str, Any]:
     """The card with its next test in one line."""
-    said = card.as_dict() | {"next": card.next_test["line"] if card.next_test is not None else ""}
+    said = asdict(card) | {"next": card.next_test["line"] if card.next_test is not None else ""}
     return said | {"laws": [list(law.values()) for law in card.laws]}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +90,7 @@ def write_until(
         from tribo.wording.card import card_of
 
         card = card or card_of(study, verdict)
-        written.append(outputs.write(out, "card.json", card.as_dict()))
+        written.append(outputs.write(out, "card.json", asdict(card)))
     if until == "report":
         from tribo.report.content import content
         from tribo.report.crate import crate_text

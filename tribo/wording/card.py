@@ -7,7 +7,7 @@ A terminal shows the table of fitted laws, the agreement with the model, a verdi
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -55,10 +55,6 @@ class Card:
     to_know: tuple[str, ...]
     next_test: dict[str, Any] | None
     doubts: tuple[str, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """The card as plain types."""
-        return asdict(self)
 
 
 def card_of(study: Study, verdict: Verdict | None) -> Card:
