@@ -40,18 +40,23 @@ QUANTITIES: dict[str, Quantity] = {
             time, test time, step time, elapsed time, timestamp, time stamp, total time, run time, running time, zeit,
             prufzeit, laufzeit, versuchszeit, temps, temps d essai, duree, t, test zeit, temps ecoule, tiempo, tempo,
             tijd, total elapsed time, cycle elapsed time, czas, czas testu, aika, tid, cas, ido, zaman, sure, timp,
-            время, час, χρονος, 时间, 试验时间, 時間, 試験時間, 経過時間, 測定時間, テスト時間, 测试时间, 시간
+            messzeit, testzeit, relativzeit, zeitstempel, uhrzeit, relative time, rel time, time since start,
+            sample time, sliding time, elapsed, seconds, sekunden, millis, milliseconds, temps de test, heure,
+            tiempo de ensayo, hora, tempo de ensaio, tempo di prova, ora, czas pomiaru, godzina, время, час, χρονος,
+            时间, 经过时间, 時刻, 试验时间, 時間, 試験時間, 経過時間, 測定時間, テスト時間, 测试时间, 시간
         """),
         _quantity("friction force", "T", "N", "force_N", """
             friction force, friction, tangential force, traction force, frictionforce, lateral force, reibkraft,
             reibungskraft, force de frottement, load, force, standard force, standardkraft, prufkraft, kraft,
             force standard, fx, ff, ft, f, load cell, axial force, traction force 1, effort, last, tangential load,
             tangentialkraft, force tangentielle, horizontal force, pull force, pulling force, tensile force,
-            frictional force, friction load, frictional load, fr, f r, f t, f x, f f,
-            sled force, fuerza de friccion, forza di attrito, fuerza, forza, forca, kracht, carga, force x, fx force,
-            daq fx, tensile load, zugkraft, charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft,
-            friktion, wrijvingskracht, treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta,
-            forca de atrito, forca de friccao, tangencialni sila, сила трения, сила, усилие, τριβη, 摩擦力, obciazenie,
+            frictional force, friction load, frictional load, fr, f r, f t, f x, f f, sled force, fuerza de friccion,
+            forza di attrito, fuerza, forza, forca, kracht, carga, force x, fx force, daq fx, tensile load, zugkraft,
+            charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft, friktion, wrijvingskracht,
+            treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta, forca de atrito,
+            forca de friccao, shear force, drag force, drag, sliding force, tan force, tang force, f fric, ffric,
+            querkraft, horizontalkraft, gleitkraft, fuerza tangencial, forca tangencial, forza tangenziale, 水平力,
+            横向力, せん断力, 引張力, tangencialni sila, сила трения, сила, усилие, τριβη, 摩擦力, obciazenie,
             нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 摩擦荷重, 摩擦抵抗, 摩擦抵抗力, 動摩擦力, 荷重, 마찰력, 하중, 힘
         """),
         _quantity("displacement", "x", "m", "displacement_m", """
@@ -64,15 +69,21 @@ QUANTITIES: dict[str, Quantity] = {
             desplazamiento, spostamento, deslocamento, verplaatsing, extension en traction, disp, displ,
             xyz x position, droga, przemieszczenie, wydluzenie, droga tarcia, siirtyma, matka, forskjutning,
             forflyttning, stracka, weglange, draha, posun, posuv, elmozdulas, yer degistirme, deplasare, recorrido,
-            corsa, percorso, curso, traversenweg, querhauptweg, gleitweg,
-            reibweg, kolbenweg, перемещение, путь, ход, 位移, 行程, 変位, ストローク, 移動距離, 변위
+            verfahrweg, verschiebung, verlangerung, schlittenweg, weg s, allongement, distance parcourue, posicion,
+            distancia, posicao, extensao, posizione, distanza, estensione, allungamento, przesuw, pozycja, elongation,
+            shear displacement, horizontal displacement, load point displacement, lp disp, carriage position,
+            stage position, pos, 滑动距离, すべり距離, 位置, 移動量, 伸び, corsa, percorso, curso, traversenweg,
+            querhauptweg, gleitweg, reibweg, kolbenweg, перемещение, путь, ход, 位移, 行程, 変位, ストローク,
+            移動距離, 변위
         """),
         _quantity("normal force", "N", "N", "normal_force_N", """
-            normal force, normal load, vertical force, normal force fz, ball load, pin load, contact force, normalkraft,
-            f n, f z, normal, contact load, specimen load, applied normal load, applied normal force,
-            carico normale, carico, vertical load, down force,
-            force normal, load normal, normalbelastung, normallast, anpresskraft, charge normale, effort normal,
-            force normale, fz, fn, fz force, daq fz, nominal load, force z, carga normal, forza normale, fuerza normal,
+            normal force, normal load, vertical force, normal force fz, ball load, pin load, contact force,
+            normalkraft, f n, f z, normal, contact load, specimen load, applied normal load, applied normal force,
+            carico normale, carico, vertical load, down force, force normal, load normal, normalbelastung, normallast,
+            anpresskraft, charge normale, effort normal, force normale, fz, fn, fz force, daq fz, nominal load,
+            force z, carga normal, forza normale, fuerza normal, applied load, applied force, pressing force,
+            clamp force, grip force, downforce, preload, auflast, belastung, pruflast, charge appliquee,
+            carga aplicada, carico applicato, sila docisku, docisk, nacisk, 加载力, 押付荷重, 押し付け力,
             sila normalna, obciazenie normalne, sila nacisku, normaalivoima, normaalkracht, normalova sila,
             pritlacna sila, normal kuvvet, forta normala, forca normal, нормальная сила, нормальная нагрузка, 法向力,
             正压力, 法向载荷, 垂直力, 垂直荷重, 法線力, 押付力, 수직하중, 수직력
@@ -82,7 +93,10 @@ QUANTITIES: dict[str, Quantity] = {
             friction coef, frictional coefficient, friction factor, coefficient friction, cof mean, mean cof, avg cof,
             average cof, cof avg, cof average, dynamic cof, kinetic cof, mean friction coefficient,
             dynamic friction coefficient, kinetic friction coefficient, dynamic coefficient of friction,
-            kinetic coefficient of friction, traction coeff, daq cof, mu, reibwert,
+            kinetic coefficient of friction, traction coeff, traction coefficient, fric coeff, daq cof, mu, reibwert,
+            friction coefficient mu, reibwert mu, reibzahl mu, reibkoeffizient, gleitreibungszahl, cof dyn,
+            coef de frottement, coef de friccion, coef de rozamiento, coef de atrito, coeficiente de friccao,
+            coeff di attrito, coefficiente d attrito, wsp tarcia, 摩擦因数,
             coefficient de frottement, reibungskoeffizient, reibzahl, reibungszahl, coefficiente di attrito,
             coeficiente de friccion, cof mu, wspolczynnik tarcia, kitkakerroin, friktionskoefficient,
             wrijvingscoefficient, koeficient treni, surtunme katsayisi, coeficient de frecare, coeficiente de atrito,
@@ -101,22 +115,23 @@ QUANTITIES: dict[str, Quantity] = {
         """),
         _quantity("humidity", "RH", "percent", "humidity_pct", """
             humidity, relative humidity, rh, feuchte, luftfeuchte, humidite, luftfeuchtigkeit, relative luftfeuchte,
-            wilgotnosc, humedad, umidita, humidade, vochtigheid, kosteus, luftfuktighet, vlhkost, nem, влажность, 湿度,
-            습도
+            wilgotnosc, humedad, umidita, humidade, vochtigheid, kosteus, luftfuktighet, vlhkost, nem, влажность,
+            湿度, 습도
         """),
         _quantity("speed", "v", "m/s", "speed_m_s", """
             sliding velocity, sliding speed, speed, velocity, geschwindigkeit, gleitgeschwindigkeit, vitesse,
             disc speed, disk speed, motor speed, drive speed, tachometer, tacho, linear speed, linear velocity,
             vitesse de glissement, gleitgeschw, predkosc, predkosc poslizgu, predkosc liniowa, velocidad,
-            velocita, velocidade, snelheid,
+            velocita, velocidade, snelheid, belt velocity, velocidad de deslizamiento, velocita di strisciamento,
+            predkosc slizgania,
             nopeus, hastighet, rychlost, hiz, viteza, скорость, скорость скольжения, 速度, 滑动速度, すべり速度,
             摺動速度, 线速度, 속도
         """),
         _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s", """
             rotation speed, rotational speed, rotary speed, spindle speed, rotational velocity, rotation rate,
-            revolution speed, rpm, drehzahl, vitesse de rotation, velocidad de giro, velocita di rotazione, toerental,
-            rotary velocity, predkosc obrotowa, obroty, otacky, pyorimisnopeus, varvtal,
-            скорость вращения, 转速, 回転数, 回転速度, 회전수
+            revolution speed, angular velocity, angular speed, rotacao, rpm, drehzahl, vitesse de rotation,
+            velocidad de giro, velocita di rotazione, toerental, rotary velocity, predkosc obrotowa, obroty, otacky,
+            pyorimisnopeus, varvtal, скорость вращения, 转速, 回転数, 回転速度, 회전수
         """),
         _quantity("frequency", "f", "Hz", "frequency_Hz", """
             frequency, oscillation frequency, stroke frequency, freq, frequenz, frequence, frecuencia, frequenza,
@@ -128,12 +143,12 @@ QUANTITIES: dict[str, Quantity] = {
         """),
         _quantity("shear stress", "tau", "Pa", "shear_stress_Pa", """
             shear stress, shearstress, shear traction, friction stress, scherspannung, schubspannung,
-            contrainte de cisaillement, contrainte tangentielle, naprezenie styczne, 剪应力, 剪切应力, せん断応力,
-            전단응력
+            contrainte de cisaillement, contrainte tangentielle, naprezenie styczne, shr stress, 剪应力, 剪切应力,
+            せん断応力, 전단응력
         """),
         _quantity("normal stress", "sigma", "Pa", "normal_stress_Pa", """
-            normal stress, effective normal stress, normalspannung, contrainte normale, naprezenie normalne, 正应力,
-            法向应力, 垂直応力, 수직응력
+            normal stress, effective normal stress, nor stress, effns, normalspannung, contrainte normale,
+            naprezenie normalne, 正应力, 法向应力, 垂直応力, 수직응력
         """),
     )
 }  # fmt: skip
@@ -226,6 +241,8 @@ _SPELLINGS = {
     "lbs": "pound_force",
     "ozf": "ounce_force",
     "kips": "kip",
+    "mpa": "megapascal",
+    "kpa": "kilopascal",
     "µm": "micrometer",
     "μm": "micrometer",
     "um": "micrometer",
@@ -269,6 +286,7 @@ _SPELLINGS = {
     "米": "meter",
 }
 _CASE_MATTERS = {
+    "mPa": "millipascal",
     "mN": "millinewton",
     "MN": "meganewton",
     "Mm": "megameter",

@@ -100,6 +100,7 @@ FAULTS = [
     Fault("missing_area", table("Time [s],COF,Normal stress [MPa]", TIME, FORCE, FORCE)),
     Fault("load_is_friction", table("Time [s],COF,Load [N]", TIME, FORCE, 12 * FORCE)),
     Fault("force_may_be_load", table("Time [s],COF,Force [N]", TIME, FORCE, 3 + 0.001 * TIME)),
+    Fault("larger_along_y", table("Time [s],Fx [N],Fy [N]", TIME, 0.01 * FORCE * (K > 5), FORCE * (K > 5))),
     Fault("no_radius", table("Time [s],Torque [N mm],Radius [mm]", TIME, FORCE, np.zeros(N))),
     Fault("names_do_not_fit", table("Time [s],Force [N],x,y,z", TIME, FORCE)),
     Fault("several_tables", GOOD + "\n" + GOOD),

@@ -10,7 +10,9 @@ import pytest
 from tribo.drafting.draft import draft_campaign
 from tribo.errors import ReadError
 from tribo.readers import inspect_export, read_blocks, read_export
+from tribo.readers.columns import by_a_word, match_column, split_unit
 from tribo.traces.evaluation import evaluate
+from tribo.units import unit_factor
 
 N = 120
 TIME = 0.05 * np.arange(N)
@@ -216,3 +218,40 @@ def test_a_name_of_a_file_with_a_number_sign_keeps_its_recorded_load(tmp_path: P
     draft = draft_campaign(tmp_path / "raw")
     assert "the normal force is recorded for 2 of 2 rows and is used" in draft.found
     assert not any("the load of" in text for text in draft.missing)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [("Godzina [s]", "time"), ("millis", "time"), ("Horizontalkraft [N]", "friction force"),
+     ("Forza tangenziale [N]", "friction force"), ("せん断力[N]", "friction force"),
+     ("Siła docisku [N]", "normal force"), ("押付荷重[N]", "normal force"),
+     ("Carga aplicada (N)", "normal force"), ("摩擦因数", "friction coefficient"),
+     ("Coef. de frottement", "friction coefficient"), ("Extensão (mm)", "displacement"), ("移動量[mm]", "displacement"),
+     ("Verfahrweg [mm]", "displacement"), ("speed_mm_s", "speed"), ("v [mm/s]", "speed"),
+     ("effns_mpa", "normal stress"), ("Angular velocity (rad/s)", "rotation speed")],
+)  # fmt: skip
+def test_further_words_of_machines_are_known(name: str, quantity: str) -> None:
+    hit = match_column(name) or by_a_word(name, split_unit(name)[1] or "")
+    assert hit is not None
+    assert hit[0] == quantity
+
+
+@pytest.mark.parametrize(("unit", "quantity", "pascal"), [("mpa", "normal stress", 1e6), ("mPa", "shear stress", 1e-3)])
+def test_a_pressure_in_small_letters_is_in_megapascal(unit: str, quantity: str, pascal: float) -> None:
+    assert unit_factor(unit, quantity)[0] == pytest.approx(pascal)
+
+
+def test_the_column_millis_of_a_board_is_in_milliseconds(tmp_path: Path) -> None:
+    trace = read_export(saved(tmp_path, "millis,force_N", 1000.0 * TIME, FRICTION))
+    np.testing.assert_allclose(trace.time_s, TIME, atol=1e-6)
+
+
+@pytest.mark.parametrize("header", ["t [s],Fx [N],Fy [N],Fz [N]", "t [s],Force X (N),Force Y (N),Force Z (N)"])
+def test_a_sensor_of_three_axes_that_is_pulled_along_y_is_not_read_along_x(tmp_path: Path, header: str) -> None:
+    pulled, noise, load = FRICTION * (TIME > 1.0), 0.02 * np.sin(50.0 * TIME), np.full(N, -5.0)
+    path = saved(tmp_path, header, TIME, noise, pulled, load)
+    assert "is the larger force along the surface" in refusal(path)
+    along_y = header.split(",")[2]
+    np.testing.assert_allclose(read_export(path, columns={"friction_force": along_y}).force_N, pulled, atol=1e-5)
+    swapped = saved(tmp_path, header, TIME, pulled, noise, load)
+    np.testing.assert_allclose(read_export(swapped).force_N, pulled, atol=1e-5)

@@ -47,9 +47,11 @@ _A_RATIO = re.compile(
 )
 _RPM = ("rpm", "RPM", "rev/min", "r/min", "1/min", "U/min", "tr/min", "obr/min", "об/мин", "转/分")
 _OF_A_CONVERTER = re.compile(r"[mµu]?v(?:olts?)?|[mµu]?v/v|bits?|counts?|digits?|adc|raw|lsb", re.I)
+_UNIT_OF_COUNTS = {"seconds": "s", "sekunden": "s", "millis": "ms", "milliseconds": "ms"}  # names that are a unit
 _ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
+_SPEED_BEHIND = re.compile(r"(.*\S)_([munk]?m)_(?:per_)?(s|min)", re.I)  # speed_mm_s
 _AFTER_BLANK = re.compile(r"^(.*\S)\s+((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
 _RUN_BEHIND = re.compile(r"(.*[\])])\s+(run\s*#?\s*\d+)\s*", re.I)  # "Force (N) Run #1" is "Run #1: Force (N)"
 
@@ -82,6 +84,8 @@ def split_unit(name: str) -> tuple[str, str | None]:
     found = _BRACKETS.search(name)
     if found:
         return name[: found.start()].strip().removesuffix("/").strip(), found.group(1).strip()
+    if (found := _SPEED_BEHIND.fullmatch(name)) and match_quantity(found.group(1)):
+        return found.group(1), f"{found.group(2)}/{found.group(3)}"
     for pattern in (_AFTER_MARK, _AFTER_BLANK):
         found = pattern.match(name)
         hit = match_quantity(found.group(1)) if found and match_quantity(name) is None else None
@@ -399,7 +403,7 @@ def by_a_word(name: str, unit: str) -> tuple[str, int] | None:
             return "normal force", len(QUANTITIES["normal force"].aliases) + 1
         if _SAYS_FRICTION.search(plain):  # before names such as load or force, which say less
             return "friction force", QUANTITIES["friction force"].aliases.index("lateral force")
-    if _SAYS_SLIDING_SPEED.search(plain) and unit and is_unit(unit, "speed"):
+    if (plain == "v" or _SAYS_SLIDING_SPEED.search(plain)) and unit and is_unit(unit, "speed"):
         return "speed", len(QUANTITIES["speed"].aliases)
     return None
 
@@ -423,7 +427,8 @@ def _by_its_unit(names: Sequence[str], units: Sequence[str], index: int, hit: tu
 def _unit_of(names: Sequence[str], units: Sequence[str], index: int) -> str:
     """The unit of a column as the file has it; a name such as "rpm" is its own."""
     own = split_unit(names[index])[0].strip()
-    return bare_unit(units[index]) or split_unit(names[index])[1] or (own if turns_a_time(own) else "")
+    named = own if turns_a_time(own) else _UNIT_OF_COUNTS.get(own.lower(), "")
+    return bare_unit(units[index]) or split_unit(names[index])[1] or named
 
 
 def _wanted_column(hint: Hint, names: Sequence[str]) -> tuple[int, str | None, str]:

@@ -52,6 +52,7 @@ _INSTEAD_OF_A_CLOCK = (
     'a column in seconds, or a row counter with the sampling interval as its unit: time = "NAME [0.01 s]" in columns'
 )
 _FEWEST_ALIKE = 50  # rows with one value, from which a column is said to be constant
+_ALONG_X = re.compile(r"((?:.*(?:\b|_))?[Ff]?)([xX])(\b.*)")  # "Fx [N]", "F_x", "DAQ.Fx (N)", "Force X"
 _CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
 
@@ -362,6 +363,8 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
     if not written.size:
         problem = Problem("header_only", "a header without data rows", source.file, layout.header_rows)
         return ReadError(problem)
+    if larger := _larger_along_y(columns, written, source, layout, given):
+        return ReadError(larger)
     arrays = {c.quantity: numbers for c, numbers in zip(columns, written, strict=True)}
     for c in columns:
         if (c.factor, c.offset) != (1.0, 0.0):  # in their own memory: a long record is not held twice
@@ -445,6 +448,39 @@ def _says_nothing(
         elif column.quantity != "displacement" and not numbers[0] and others:
             found[column.index] = f"it is zero in every row, unlike {layout.name(min(others))}"
     return found
+
+
+def _larger_along_y(
+    columns: Sequence[Column], written: FloatArray, source: Source, layout: Layout, given: Given
+) -> Problem | None:
+    """The fault of a force that is read along x while the one along y is the larger: a sensor of three axes.
+
+    It counts as larger if it is twice as large, and changes twice as much from the beginning.
+    """
+    named = (k for k, c in enumerate(columns) if c.quantity == "friction force" and c.reason.startswith("named"))
+    x = next(named, None)
+    if x is None or (along_x := _ALONG_X.fullmatch(layout.names[columns[x].index])) is None:
+        return None
+    called = along_x[1] + ("y" if along_x[2] == "x" else "Y") + along_x[3]
+    if called not in layout.names or not layout.filled[layout.names.index(called)]:
+        return None
+    try:
+        across, _ = parse_block(source, layout, [layout.names.index(called)], given.accepted)
+    except ReadError:
+        return None
+    if across.shape[1] != written.shape[1]:
+        return None
+    of_x, of_y = ((_typical(v), _typical(v - np.median(v[:5]))) for v in (written[x], across[0]))
+    if of_y[0] < 2.0 * of_x[0] or of_y[1] < 2.0 * of_x[1]:
+        return None
+    name = layout.names[columns[x].index]
+    allowed = f'friction_force = "{called}" in columns; or friction_force = "{name}" if it is the friction nevertheless'
+    what = f"{called} is the larger force along the surface, and {name} would be read as the friction force"
+    return Problem("larger_along_y", what, source.file, layout.names_row, name, allowed=allowed)
+
+
+def _typical(values: FloatArray) -> float:
+    return float(np.quantile(np.abs(values), 0.9))
 
 
 def _without_numbers(why: ReadError, source: Source, layout: Layout, given: Given) -> dict[int, str]:
