@@ -23,20 +23,19 @@ class Quantity:
     """
 
     name: str
-    symbol: str
     si_unit: str
     column: str
     aliases: tuple[str, ...]
 
 
-def _quantity(name: str, symbol: str, si_unit: str, column: str, names: str) -> Quantity:
-    return Quantity(name, symbol, si_unit, column, tuple(alias.strip() for alias in names.split(",")))
+def _quantity(name: str, si_unit: str, column: str, names: str) -> Quantity:
+    return Quantity(name, si_unit, column, tuple(alias.strip() for alias in names.split(",")))
 
 
 QUANTITIES: dict[str, Quantity] = {
     q.name: q
     for q in (
-        _quantity("time", "t", "s", "time_s", """
+        _quantity("time", "s", "time_s", """
             time, test time, step time, elapsed time, timestamp, time stamp, total time, run time, running time, zeit,
             prufzeit, laufzeit, versuchszeit, temps, temps d essai, duree, t, test zeit, temps ecoule, tiempo, tempo,
             tijd, total elapsed time, cycle elapsed time, czas, czas testu, aika, tid, cas, ido, zaman, sure, timp,
@@ -45,7 +44,7 @@ QUANTITIES: dict[str, Quantity] = {
             tiempo de ensayo, hora, tempo de ensaio, tempo di prova, ora, czas pomiaru, godzina, время, час, χρονος,
             时间, 经过时间, 時刻, 试验时间, 時間, 試験時間, 経過時間, 測定時間, テスト時間, 测试时间, 시간
         """),
-        _quantity("friction force", "T", "N", "force_N", """
+        _quantity("friction force", "N", "force_N", """
             friction force, friction, tangential force, traction force, frictionforce, lateral force, reibkraft,
             reibungskraft, force de frottement, load, force, standard force, standardkraft, prufkraft, kraft,
             force standard, fx, ff, ft, f, load cell, axial force, traction force 1, effort, last, tangential load,
@@ -59,7 +58,7 @@ QUANTITIES: dict[str, Quantity] = {
             横向力, せん断力, 引張力, tangencialni sila, сила трения, сила, усилие, τριβη, 摩擦力, obciazenie,
             нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 摩擦荷重, 摩擦抵抗, 摩擦抵抗力, 動摩擦力, 荷重, 마찰력, 하중, 힘
         """),
-        _quantity("displacement", "x", "m", "displacement_m", """
+        _quantity("displacement", "m", "displacement_m", """
             extension, displacement, stroke, crosshead, crosshead position, position, standard travel, standardweg,
             course standard, weg, hub, course, deplacement, axial displacement, traverse, course traverse,
             traverse abs, traverse absolue, maschine, maschinenweg, machine displacement, linear position,
@@ -76,7 +75,7 @@ QUANTITIES: dict[str, Quantity] = {
             querhauptweg, gleitweg, reibweg, kolbenweg, перемещение, путь, ход, 位移, 行程, 変位, ストローク,
             移動距離, 변위
         """),
-        _quantity("normal force", "N", "N", "normal_force_N", """
+        _quantity("normal force", "N", "normal_force_N", """
             normal force, normal load, vertical force, normal force fz, ball load, pin load, contact force,
             normalkraft, f n, f z, normal, contact load, specimen load, applied normal load, applied normal force,
             carico normale, carico, vertical load, down force, force normal, load normal, normalbelastung, normallast,
@@ -88,7 +87,7 @@ QUANTITIES: dict[str, Quantity] = {
             pritlacna sila, normal kuvvet, forta normala, forca normal, нормальная сила, нормальная нагрузка, 法向力,
             正压力, 法向载荷, 垂直力, 垂直荷重, 法線力, 押付力, 수직하중, 수직력
         """),
-        _quantity("friction coefficient", "mu", "", "friction_coefficient", """
+        _quantity("friction coefficient", "", "friction_coefficient", """
             cof, friction coefficient, coefficient of friction, friction coeff, coeff of friction, coef of friction,
             friction coef, frictional coefficient, friction factor, coefficient friction, cof mean, mean cof, avg cof,
             average cof, cof avg, cof average, dynamic cof, kinetic cof, mean friction coefficient,
@@ -103,22 +102,22 @@ QUANTITIES: dict[str, Quantity] = {
             coeficiente de rozamiento, coefficient de friction, коэффициент трения, 摩擦系数, 摩擦係数,
             动摩擦系数, 動摩擦係数, 마찰계수
         """),
-        _quantity("torque", "M", "N m", "torque_Nm", """
+        _quantity("torque", "N m", "torque_Nm", """
             friction torque, torque, frictional torque, axial torque, spindle torque, measured torque, torque cell,
             friction moment, reibmoment, drehmoment, moment, couple,
             couple de frottement, moment de frottement, coppia, momento, par, koppel, moment tarcia, moment sily,
             момент, момент трения, 扭矩, 摩擦力矩, トルク, 摩擦トルク, 토크
         """),
-        _quantity("temperature", "theta", "degC", "temperature_C", """
+        _quantity("temperature", "degC", "temperature_C", """
             temperature, temp, temperatur, ambient temperature, room temperature, raumtemperatur, temperature c,
             temperatura, temperature ambiante, lampotila, teplota, sicaklik, температура, 温度, 온도
         """),
-        _quantity("humidity", "RH", "percent", "humidity_pct", """
+        _quantity("humidity", "percent", "humidity_pct", """
             humidity, relative humidity, rh, feuchte, luftfeuchte, humidite, luftfeuchtigkeit, relative luftfeuchte,
             wilgotnosc, humedad, umidita, humidade, vochtigheid, kosteus, luftfuktighet, vlhkost, nem, влажность,
             湿度, 습도
         """),
-        _quantity("speed", "v", "m/s", "speed_m_s", """
+        _quantity("speed", "m/s", "speed_m_s", """
             sliding velocity, sliding speed, speed, velocity, geschwindigkeit, gleitgeschwindigkeit, vitesse,
             disc speed, disk speed, motor speed, drive speed, tachometer, tacho, linear speed, linear velocity,
             vitesse de glissement, gleitgeschw, predkosc, predkosc poslizgu, predkosc liniowa, velocidad,
@@ -127,26 +126,26 @@ QUANTITIES: dict[str, Quantity] = {
             nopeus, hastighet, rychlost, hiz, viteza, скорость, скорость скольжения, 速度, 滑动速度, すべり速度,
             摺動速度, 线速度, 속도
         """),
-        _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s", """
+        _quantity("rotation speed", "revolution/s", "rotation_rev_per_s", """
             rotation speed, rotational speed, rotary speed, spindle speed, rotational velocity, rotation rate,
             revolution speed, angular velocity, angular speed, rotacao, rpm, drehzahl, vitesse de rotation,
             velocidad de giro, velocita di rotazione, toerental, rotary velocity, predkosc obrotowa, obroty, otacky,
             pyorimisnopeus, varvtal, скорость вращения, 转速, 回転数, 回転速度, 회전수
         """),
-        _quantity("frequency", "f", "Hz", "frequency_Hz", """
+        _quantity("frequency", "Hz", "frequency_Hz", """
             frequency, oscillation frequency, stroke frequency, freq, frequenz, frequence, frecuencia, frequenza,
             frequencia, czestotliwosc, частота, 频率, 周波数, 振动频率, 주파수
         """),
-        _quantity("radius", "r", "m", "radius_m", """
+        _quantity("radius", "m", "radius_m", """
             radius, track radius, wear track radius, disc track radius, sliding radius, bahnradius, laufradius, rayon,
             raggio, radio, promien, polomer, радиус, 半径, 반경
         """),
-        _quantity("shear stress", "tau", "Pa", "shear_stress_Pa", """
+        _quantity("shear stress", "Pa", "shear_stress_Pa", """
             shear stress, shearstress, shear traction, friction stress, scherspannung, schubspannung,
             contrainte de cisaillement, contrainte tangentielle, naprezenie styczne, shr stress, 剪应力, 剪切应力,
             せん断応力, 전단응력
         """),
-        _quantity("normal stress", "sigma", "Pa", "normal_stress_Pa", """
+        _quantity("normal stress", "Pa", "normal_stress_Pa", """
             normal stress, effective normal stress, nor stress, effns, normalspannung, contrainte normale,
             naprezenie normalne, 正应力, 法向应力, 垂直応力, 수직응력
         """),

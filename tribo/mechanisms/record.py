@@ -27,8 +27,7 @@ from tribo.mechanisms.conditions import (
 from tribo.records import FloatArray
 
 OnTest = tuple[Values, str]
-"""How a mechanism acts on one test: its values there, and the sample that takes the place of the labelled one, if any.
-"""
+"""How a mechanism acts on one test: its values there, and the sample that takes the place of the labelled one."""
 
 
 def no_choice(base: Base, conditions: Conditions) -> tuple[str, ...]:
