@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -145,6 +146,16 @@ def test_a_link_of_a_drop_folder_that_leads_nowhere_is_refused_and_stops_no_buil
     (looked_at,) = scan(drop, 0.0)
     assert (looked_at.name, looked_at.refused) == ("astray", (LEADS_NOWHERE,))
     assert place_problems(tmp_path / "site", (drop, drop / "astray")) == []
+
+
+def test_a_link_of_a_drop_folder_to_a_pipe_or_a_device_has_a_row_of_its_own(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / ".pipe")
+    (tmp_path / "device").symlink_to("/dev/zero")
+    (tmp_path / "piped").symlink_to(".pipe")
+    assert {d.name: (d.waiting, d.refused) for d in scan(tmp_path, 0.0)} == {
+        "device": ((LEADS_OUT,), ()),
+        "piped": ((), (LEADS_NOWHERE,)),
+    }
 
 
 def test_files_behind_links_of_a_campaign_in_a_drop_folder_are_not_hashed(campaign: Path, elsewhere: Path) -> None:

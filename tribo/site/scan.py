@@ -24,7 +24,7 @@ OVERRIDES = ".overrides.csv"
 _NOT_IN_NAMES = ("\\",)
 _PAGES_OF_THE_SITE = ("index.html", "trend.csv")
 IGNORED = ("Thumbs.db", "desktop.ini", ".DS_Store")
-LEADS_NOWHERE = "this is a link that leads nowhere; put the file or folder itself here"
+LEADS_NOWHERE = "this is a link that leads to no file or folder; put the file or folder itself here"
 _CHUNK = 1 << 20
 _LINK = "a link that leads out of the campaign"  # in place of a hash: nothing behind it is read
 
@@ -118,7 +118,7 @@ def _is_campaign(path: Path) -> bool:
 
 
 def _leads_nowhere(path: Path) -> bool:
-    return path.is_symlink() and not path.exists()
+    return path.is_symlink() and not (path.is_file() or path.is_dir())
 
 
 def _uploading(name: str) -> bool:
