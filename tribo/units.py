@@ -53,10 +53,11 @@ QUANTITIES: dict[str, Quantity] = {
             forza di attrito, fuerza, forza, forca, kracht, carga, force x, fx force, daq fx, tensile load, zugkraft,
             charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft, friktion, wrijvingskracht,
             treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta, forca de atrito,
-            forca de friccao, shear force, drag force, drag, sliding force, tan force, tang force, f fric, ffric,
-            querkraft, horizontalkraft, gleitkraft, fuerza tangencial, forca tangencial, forza tangenziale, 水平力,
-            横向力, せん断力, 引張力, tangencialni sila, сила трения, сила, усилие, τριβη, 摩擦力, obciazenie,
-            нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 摩擦荷重, 摩擦抵抗, 摩擦抵抗力, 動摩擦力, 荷重, 마찰력, 하중, 힘
+            forca de friccao, shear force, drag force, drag, sliding force, tan force, tang force, f fric, f drag,
+            f tan, ffric, querkraft, horizontalkraft, gleitkraft, fuerza tangencial, forca tangencial,
+            forza tangenziale, 水平力, 横向力, せん断力, 引張力, tangencialni sila, сила трения, сила, усилие, τριβη,
+            摩擦力, obciazenie, нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 力值, 拉力, 摩擦荷重, 摩擦抵抗, 摩擦抵抗力,
+            動摩擦力, 荷重, 마찰력, 하중, 힘
         """),
         _quantity("displacement", "m", "displacement_m", """
             extension, displacement, stroke, crosshead, crosshead position, position, standard travel, standardweg,

@@ -255,3 +255,31 @@ def test_a_sensor_of_three_axes_that_is_pulled_along_y_is_not_read_along_x(tmp_p
     np.testing.assert_allclose(read_export(path, columns={"friction_force": along_y}).force_N, pulled, atol=1e-5)
     swapped = saved(tmp_path, header, TIME, pulled, noise, load)
     np.testing.assert_allclose(read_export(swapped).force_N, pulled, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Zeit;Reibkraft;Normalkraft;Weg\nCH0;CH1;CH2;CH3\ns;N;N;mm",
+        "Time,Friction,Normal,Position\ns,N,N,mm\nAI0,AI1,AI2,ENC",
+    ],
+)
+def test_a_row_of_channel_numbers_beside_names_and_units_hides_neither(tmp_path: Path, header: str) -> None:
+    trace = read_export(saved(tmp_path, header, TIME, FRICTION, np.full(N, 5.0), TIME))
+    np.testing.assert_allclose(trace.force_N, FRICTION, rtol=1e-5)
+    assert trace.first_row == 4
+
+
+@pytest.mark.parametrize("mark", ["%", "#", "//", ";"])
+def test_a_comment_mark_before_the_first_name_is_none_of_it(tmp_path: Path, mark: str) -> None:
+    rows = "\n".join(f"{t:.3f}\t{f:.5f}" for t, f in zip(TIME, FRICTION, strict=True))
+    (tmp_path / "a.dat").write_text(f"{mark}Rig 3\n{mark}Time(s)\tFt(N)\n{rows}\n", encoding="utf-8")
+    np.testing.assert_allclose(read_export(tmp_path / "a.dat").force_N, FRICTION, atol=1e-5)
+
+
+def test_the_force_along_a_needle_is_not_taken_for_friction(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Time [s],Insertion depth [mm],Axial force [N]", TIME, TIME, FRICTION)
+    assert "no column was recognised as the friction force" in refusal(path)
+    np.testing.assert_allclose(
+        read_export(path, columns={"friction_force": "Axial force"}).force_N, FRICTION, rtol=1e-5
+    )

@@ -365,11 +365,12 @@ def _matches(
         for index in hits:
             if plain_name(split_unit(names[index])[0]) in _ALONG_THE_AXIS:
                 hits[index] = ("normal force", len(QUANTITIES["normal force"].aliases))
-    loads = [index for index in hits if split_unit(names[index])[0].strip().lower() in _MEANS_NORMAL_BESIDE_FRICTION]
+    plain = [plain_name(split_unit(name)[0]) for name in names]
+    pressed = "displacement" not in there and any(map(_SAYS_DEPTH.search, plain))  # an indenter, a needle
+    of_loads = _MEANS_NORMAL_BESIDE_FRICTION | (_ALONG_THE_AXIS | {"force", "kraft", "fz"} if pressed else set())
+    loads = [index for index in hits if split_unit(names[index])[0].strip().lower() in of_loads]
     friction = [(rank, index) for index, (quantity, rank) in hits.items() if quantity == "friction force"]
     of_another = "friction force" in asked or bool(friction and min(friction)[1] not in loads)
-    plain = [plain_name(name) for name in names]
-    pressed = "displacement" not in there and any(map(_SAYS_DEPTH.search, plain))  # an indenter
     ratio = there & {"friction coefficient", "torque"} or any(map(_A_RATIO.search, plain))
     if not (of_another or ratio or pressed):
         loads = [index for _, index in sorted(friction)[1:] if index in loads]

@@ -25,6 +25,7 @@ _ROWS_SEARCHED = 100  # for the first number of a column
 _HEADER_LINES_LOOKED_AT = 200
 _MEASURED = ("time", "friction force", "displacement", "temperature", "speed", "torque")
 _COMMENTS = {"comment", "comments", "kommentar", "commentaire"}
+_MARK_AT_NAME = re.compile(r"^(?:[#%;]|//)+\s*(?=[^\W\d])")  # "%Time(s)"
 _COMMENT_MARKS = ("#", "%", "//", ";")
 BLANK = ' \t;,"|'
 _TEXT_LINE = re.compile(rb'^[ \t;,"]*[A-Za-z#*<\[({=_\x80-\xff][^\n]*', re.M)
@@ -298,13 +299,18 @@ def _with_header(lines: Sequence[str], layout: Layout, given: Given) -> Layout:
         return replace(layout, names=nothing, units=nothing, metadata=_metadata(lines, rows, layout.delimiter))
 
     above = [k for k in range(layout.header_rows) if lines[k].strip(BLANK)]
-    cells = {k: _header_cells(lines[k], layout) for k in above[-2:]}
+    cells = {k: _header_cells(lines[k], layout) for k in above[-3:]}
     if not above or len(cells[above[-1]]) == 1 < layout.n_cells:
         return nameless(above)
     hits = {k: sum(_known(cell, given) for cell in row) for k, row in cells.items()}
     names_row, units_row = above[-1], None
     if len(above) > 1 and (hits[above[-2]] > hits[above[-1]] or _are_units(cells[above[-1]], cells[above[-2]])):
         names_row, units_row = above[-2], above[-1]
+    if len(above) > 2 and hits[above[-3]] > 1 and hits[above[-2]] == hits[above[-1]] == 0:  # one of both is of channels
+        alike = len(cells[above[-3]]) == len(cells[above[-2]]) == len(cells[above[-1]]) == layout.n_cells
+        units = [k for k in above[-2:] if _are_units(cells[k], cells[above[-3]])]
+        if alike and units:
+            names_row, units_row = above[-3], units[0]
     layout = nameless(k for k in above if k < names_row)
     if units_row is not None:
         layout = replace(layout, units=_fit(cells[units_row], layout.n_cells), units_row=units_row + 1)
@@ -331,6 +337,8 @@ def _header_cells(line: str, layout: Layout) -> list[str]:
     cells = cut(line, layout.delimiter)
     if layout.delimiter == " " and len(cells) == layout.n_cells + 1 and cells[0] in _COMMENT_MARKS:
         return cells[1:]
+    if cells and len(cells) == layout.n_cells:
+        cells[0] = _MARK_AT_NAME.sub("", cells[0])
     if layout.delimiter != " " or len(cells) == layout.n_cells:
         return cells
     wider = re.split(r"\s{2,}", line.replace('"', "").strip())
