@@ -784,6 +784,11 @@ class Ingested:
     readings: tuple[Reading, ...] = ()
     features: Mapping[str, Mapping[str, Feature]] = field(default_factory=dict)
 
+    @property
+    def used_tests(self) -> tuple[Test, ...]:
+        """The tests that have a pull, in the order of the campaign."""
+        return tuple(test for test in self.campaign.tests if test.test_id in self.pulls)
+
     def typical(self, tests: Sequence[Test]) -> Test:
         """Of some usable tests that with the fewest flags, and among these the one whose static peak lies nearest their
         median; equally near ones, to nine digits, in the order of their ids, so that every processor chooses alike."""
@@ -829,7 +834,7 @@ class Ingested:
         """
         import pandas as pd
 
-        tests = [test for test in self.campaign.tests if test.test_id in self.pulls]
+        tests = self.used_tests
         named = ("test_id", "sample", "specimen", "normal_load_N")
         rows = [
             {name: getattr(test, name) for name in named}

@@ -298,7 +298,7 @@ def sample_numbers(study: Study) -> dict[str, int]:
 
 def tested_samples(study: Study) -> list[str]:
     """The samples of which a pull was read, in the order of their places."""
-    read = {t.sample for t in study.ingested.campaign.tests if t.test_id in study.ingested.pulls}
+    read = {t.sample for t in study.ingested.used_tests}
     return [sample for sample in sample_numbers(study) if sample in read]
 
 

@@ -501,7 +501,7 @@ def with_repeats(lack: TooLittle, ingested: Ingested) -> TooLittle:
 
     Settings are speed, hold, stiffness, and further columns in which several tests share each of the values.
     """
-    tests = [t for t in ingested.campaign.tests if t.test_id in ingested.pulls and t.normal_load_N > 0]
+    tests = [t for t in ingested.used_tests if t.normal_load_N > 0]
     further = {name: [t.covariates.get(name, "") for t in tests] for name in tests[0].covariates} if tests else {}
     set_on_purpose = [name for name, values in further.items() if 2 * len(set(values)) <= len(values)]
     found = []

@@ -58,6 +58,11 @@ class Observations:
     def n(self) -> int:
         return len(self.test_ids)
 
+    @property
+    def samples(self) -> list[str]:
+        """Their names, the flat sample first."""
+        return sorted(set(self.conditions.sample.tolist()), key=lambda sample: (sample != self.flat, sample))
+
     def take(self, keep: np.ndarray) -> Observations:
         """The tests picked by a mask or by indices, in that order."""
         from dataclasses import fields, replace
@@ -78,7 +83,7 @@ class Observations:
 def observe(ingested: Ingested) -> Observations:
     """The observations of a campaign; tests without a positive static and sliding force are left out."""
     campaign = ingested.campaign
-    pairs = [(t, ingested.pulls[t.test_id]) for t in campaign.tests if t.test_id in ingested.pulls]
+    pairs = [(t, ingested.pulls[t.test_id]) for t in ingested.used_tests]
     good = [(t, p) for t, p in pairs if p.static_N > 0 and p.sliding_N > 0]
     left_out = tuple(
         SetAside(t.test_id, "no positive friction force was read off its trace")

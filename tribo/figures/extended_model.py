@@ -53,7 +53,7 @@ def extended_numbers(d: Diagnosis) -> pd.DataFrame:
     if d.simulated_log_force is not None:
         residuals["simulated"] = o.log_force - d.simulated_log_force
     levels = findings.load_levels(o.conditions.normal_load_N)
-    samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
+    samples = o.samples
     rows = [
         {
             "sample_number": number, "sample": sample, "regime": regime, "normal_load_N": float(load), "model": model,

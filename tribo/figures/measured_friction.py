@@ -121,8 +121,8 @@ def restart_points(study: Study) -> pd.DataFrame:
     rows = [
         {"sample_number": order[test.sample], "sample": test.sample, "test_id": test.test_id, "hold_s": restart.hold_s,
          "T_over_N": restart.static_N / test.normal_load_N, "T_over_N_u": restart.static_u_N / test.normal_load_N}
-        for test in (study.ingested.campaign.tests if shown(study) else ())
-        if test.test_id in study.ingested.pulls and test.normal_load_N > 0
+        for test in (study.ingested.used_tests if shown(study) else ())
+        if test.normal_load_N > 0
         for restart in study.ingested.pulls[test.test_id].restarts
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=RESTART_COLUMNS)

@@ -113,7 +113,7 @@ def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict
     observable, title, column, here, p = panel
     o = d.baseline.setup.observations
     weight = np.array(WEIGHTS[observable])
-    samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
+    samples = o.samples
     places = {s: i for i, s in enumerate(samples)}
     x, y, p_text = column.values, percent(residual @ weight), "< 0.001" if p < 1e-3 else f"= {p:.2g}"
     added = added_by_causes(d, residual, weight)

@@ -47,7 +47,7 @@ class Condition:
 def conditions(study: Study) -> list[Condition]:
     """The conditions of the tests that were used, in the order of ASTM G115: bodies, contact, motion, surroundings."""
     campaign = study.ingested.campaign
-    tests = [t for t in campaign.tests if t.test_id in study.ingested.pulls]
+    tests = list(study.ingested.used_tests)
     return [*_bodies(study, tests), *_contact(campaign, tests), *_motion(campaign, tests), *_surroundings(tests)]
 
 

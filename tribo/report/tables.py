@@ -142,8 +142,7 @@ def restarts_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | N
     pulls, names = study.ingested.pulls, outputs.product("restarts.csv").column_names
     rows = [
         {name: getattr(test, name) for name in names[:4]} | {"restart": number} | vars(restart)
-        for test in study.ingested.campaign.tests
-        if test.test_id in pulls
+        for test in study.ingested.used_tests
         for number, restart in enumerate(pulls[test.test_id].restarts, start=1)
     ]
     return pd.DataFrame(rows, columns=names) if rows else None
@@ -157,8 +156,7 @@ def phases_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | Non
             test.test_id, p.name, p.start_s, p.end_s, 1e3 * p.speed_m_s, p.normal_load_N, p.cycle, p.force_N,
             p.force_u_N, p.evidence, p.doubt,
         )
-        for test in study.ingested.campaign.tests
-        if test.test_id in pulls
+        for test in study.ingested.used_tests
         for p in pulls[test.test_id].phases
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=outputs.product("phases.csv").column_names) if rows else None
@@ -172,8 +170,7 @@ def events_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | Non
             test.test_id, number, s.start_s, s.fail_s, s.end_s, s.stiffness_N_per_m, s.points, s.drop_N, 1e6 * s.slip_m,
             s.duration_s, 1e3 * s.peak_velocity_m_s, 1e6 * s.precursory_slip_m, s.recurrence_s, s.hold_s,
         )
-        for test in study.ingested.campaign.tests
-        if test.test_id in pulls
+        for test in study.ingested.used_tests
         for number, s in enumerate(pulls[test.test_id].slips, start=1)
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=outputs.product("events.csv").column_names) if rows else None

@@ -59,8 +59,7 @@ class Card:
 
 def card_of(study: Study, verdict: Verdict | None) -> Card:
     """The card of a study; ``verdict`` is the worded one of its diagnosis, None where none was made."""
-    campaign, used = study.ingested.campaign, study.ingested.pulls
-    tests = [t for t in campaign.tests if t.test_id in used]
+    campaign, tests = study.ingested.campaign, study.ingested.used_tests
     aside, specimens = len(all_set_aside(study)), len(specimens_of(campaign, tests))
     fits = [fit for s in findings.sample_numbers(study) for r in REGIMES if (fit := _law(study, s, r)) is not None]
     return Card(
@@ -69,7 +68,7 @@ def card_of(study: Study, verdict: Verdict | None) -> Card:
         used=len(tests),
         set_aside=aside,
         specimens=specimens,
-        counts=_counts(study, len(tests), aside, specimens),
+        counts=_counts(study, aside, specimens),
         intercept="τ₀ (kPa)" if campaign.has_area else "T₀ (N)",
         laws=tuple(card_law(fit) for fit in fits),
         uncertainty=uncertainty_kind(study),
@@ -106,15 +105,14 @@ def _largest(fit: LawFit) -> str:
     return "; ".join(f"{NUMBERS[key]}: {name} ({share:.0f} %)" for key, (name, share) in parts.items())
 
 
-def _counts(study: Study, used: int, aside: int, specimens: int) -> str:
-    tests = [t for t in study.ingested.campaign.tests if t.test_id in study.ingested.pulls]
-    samples = findings.tested_samples(study)
+def _counts(study: Study, aside: int, specimens: int) -> str:
+    tests, samples = study.ingested.used_tests, findings.tested_samples(study)
     levels = np.unique(findings.load_levels(np.array([t.normal_load_N for t in tests], float)))
     where = f"{counted(specimens, 'specimen')}, {counted(len(samples), 'sample')} ({joined(samples)})"
-    loads = loads_in_words(levels.tolist()) if used else ""
+    loads = loads_in_words(levels.tolist()) if tests else ""
     left_out = f"{counted(aside, 'test')} set aside" if aside else "no test set aside"
     doubts = f", {counted(len(study.doubts), 'doubtful number')}" if study.doubts else ""
-    return f"{counted(used, 'test')} used, {left_out}{doubts}; {where}{f'; {loads}' if loads else ''}."
+    return f"{counted(len(tests), 'test')} used, {left_out}{doubts}; {where}{f'; {loads}' if loads else ''}."
 
 
 def _next(verdict: Verdict | None) -> dict[str, Any] | None:

@@ -62,9 +62,8 @@ OSCILLATING = {
 
 def what_was_measured(study: Study) -> str:
     """Number of pulls, specimens, samples and loads."""
-    campaign, used = study.ingested.campaign, study.ingested.pulls
+    campaign, tests = study.ingested.campaign, study.ingested.used_tests
     aside = len(all_set_aside(study))
-    tests = [t for t in campaign.tests if t.test_id in used]
     samples = findings.tested_samples(study)
     specimens = specimens_of(campaign, tests)
     loads = np.array([t.normal_load_N for t in tests])
