@@ -64,7 +64,6 @@ class TableReading:
     correlation: float
     specimens: int
     why: str
-    table: PublishedTable
     baseline: TableFit
     contrasts: Mapping[TableContrast | str, float]
     weighed: tuple[TableFit, ...]
@@ -122,7 +121,7 @@ def diagnose_reading(
     earned = float(np.sqrt(2.0 * max(weighed[0].score - baseline.score, 0.0)))
     contrasts, p_library = _screen(baseline, rng, earned)
     left, _ = _screen(_widened(weighed[0]), rng)
-    return TableReading(*reading, table, baseline, contrasts, tuple(weighed), p_library, left)
+    return TableReading(*reading, baseline, contrasts, tuple(weighed), p_library, left)
 
 
 def weigh_table(baseline: TableFit) -> list[TableFit]:
@@ -284,7 +283,7 @@ def misfits(result: TableReading) -> list[Misfit]:
     and these two pressures in kPa.
     """
     found: list[Misfit] = []
-    pressures = result.table.pressures_kPa
+    pressures = result.baseline.table.pressures_kPa
     for contrast, p in sorted(result.contrasts.items(), key=lambda item: item[1]):
         if p >= LEVEL or isinstance(contrast, str):
             continue
@@ -300,7 +299,7 @@ def misfits(result: TableReading) -> list[Misfit]:
 
 def _ratio_percent(result: TableReading, sample: str, observable: str) -> tuple[float, float]:
     """Measured less modelled T in percent of the model: the mean at either end of the loads, lowest first."""
-    table = result.table
+    table = result.baseline.table
     picked = [k for k, s in enumerate(table.samples) if s == sample or (sample == PATTERNS and s != "F")]
     rows = REGIME_ROWS[observable]
     flat = table.values.reshape(-1, 4)[table.samples.index("F")]
@@ -398,7 +397,7 @@ def across_published(d: PublishedDiagnosis, *, seed: int = 0) -> tuple[LawsAcros
 
     Readings differ in the correlation and the number of specimens, which this search does not use, and in the model.
     """
-    found = across_patterns(table_deviations(d.main.table), most_terms=3, seed=seed)
+    found = across_patterns(table_deviations(d.main.baseline.table), most_terms=3, seed=seed)
     if not found:
         raise ValueError("a law across patterns needs at least four patterns")
     return found

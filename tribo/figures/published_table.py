@@ -42,7 +42,7 @@ def ratio_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     from tribo.berardo2019.table_model import friction_at
 
     main = d.main
-    table, best = main.table, main.weighed[0]
+    table, best = main.baseline.table, main.weighed[0]
     flat = table.values.reshape(-1, 4)[table.samples.index("F")]
     model = friction_at(table, flat)
     measured = table.friction(table.values)
@@ -62,7 +62,7 @@ def ratio_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
 
 def _relative_u(result: TableReading, correlation: float | None) -> np.ndarray:
     """Standard uncertainty of measured T over T, (samples, regimes, loads); ``correlation`` None as in the reading."""
-    table = result.table
+    table = result.baseline.table
     blocks = table.data_covariance.reshape(len(table.samples) * 2, 2, -1, 2)
     cov = np.array([blocks[k, :, k, :] for k in range(len(blocks))])
     if correlation is not None:

@@ -93,7 +93,7 @@ def _instrument_instead(outlooks: Sequence[TableReading]) -> list[str]:
 
 def _adhesion_along_y(outlook: TableReading) -> str:
     """The adhesion of S across its long cavities, from the table itself."""
-    table = outlook.table
+    table = outlook.baseline.table
     i = table.samples.index("Sy")
     measured = table.values.reshape(-1, 2, 2)[i, :, 1]
     sd = np.sqrt(np.diag(table.data_covariance)).reshape(-1, 2, 2)[i, :, 1]
@@ -106,7 +106,8 @@ def _adhesion_along_y(outlook: TableReading) -> str:
 
 def _flat_traction_Pa(outlook: TableReading) -> float:
     """Static traction of the flat sample at 10 kPa by the calibrated law."""
-    law = outlook.table.values.reshape(-1, 4)[outlook.table.samples.index("F")]
+    table = outlook.baseline.table
+    law = table.values.reshape(-1, 4)[table.samples.index("F")]
     return float(law[0] * 10e3 + law[1] * 1e3)
 
 
@@ -115,9 +116,10 @@ def _extension(main: TableReading, best: TableFit, gain: Gain) -> str:
     name, e = next(iter(estimate_of(best).items()))
     before, after = -2 * main.baseline.score, -2 * best.score
     clear = gain.difference > 2 * gain.se
+    n = len(main.baseline.table.values)
     text = (
         f"The best extension is {best.mechanism.in_words}, {name} = {e.value:.2g} {e.unit}".rstrip()
-        + f" (90 % interval {e.low:.2g} to {e.high:.2g}): chi-squared of the {len(main.table.values)} numbers falls "
+        + f" (90 % interval {e.low:.2g} to {e.high:.2g}): chi-squared of the {n} numbers falls "
         f"from {before:.0f} to {after:.0f}. On whole samples left out of the fit its gain is {gain.difference:+.2f} +- "
         f"{gain.se:.2f} in log score per number, which {'is clear' if clear else 'may be chance'}."
     )
