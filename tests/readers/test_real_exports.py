@@ -30,7 +30,7 @@ READ = {
     "fr_te67_PPS_60N_2.tsv": ("te67", (1801,), "Test Time [s]", "Friction Force [N]", None),
     "ten_bam_42CrMoS4_46NT71.csv": ("bam", (768,), "Time [s]", "Force [kN]", "Displacement [mm]"),
     "ten_instron8852_de_semicolonline_tab.csv": ("bam", (712,), "Zeit [s]", "Kraft [kN]", "Maschine [mm]"),
-    "ten_mts793_DEU_latin1_comma.dat": ("mts793", (1024, 192), "Laufzeit [s]", "Ch 1 Kraft [kN]", "Ch 1 Weg [mm]"),
+    "ten_mts793_DEU_latin1_comma.dat": ("mts793", (1216,), "Laufzeit [s]", "Ch 1 Kraft [kN]", "Ch 1 Weg [mm]"),
     "ten_shimadzu_quoted_fr.csv": ("trapezium", (22387,), "Temps [sec]", "Force [N]", "Stroke [mm]"),
     "ten_walterbai_semicolon.csv": (
         "walterbai", (1667,), "C_1_Temps [s]", "C_1_Force [kN]", "C_1_Déplacement [mm]",

@@ -283,3 +283,16 @@ def test_the_force_along_a_needle_is_not_taken_for_friction(tmp_path: Path) -> N
     np.testing.assert_allclose(
         read_export(path, columns={"friction_force": "Axial force"}).force_N, FRICTION, rtol=1e-5
     )
+
+
+@pytest.mark.parametrize(("pause_s", "records"), [(0.0, 1), (5.0, 3)])
+def test_the_buffers_of_a_long_acquisition_are_one_record(tmp_path: Path, pause_s: float, records: int) -> None:
+    text = "MTS793|BTW|ENU|1|2|.|/|:|1|0|0|A\n"
+    for block in np.split(np.arange(N), 3):
+        text += f"\nData Acquisition:\tTimed\t\tTime:\t{TIME[block[-1]]:.3f}\ts\nAxial Force\tTime\nN\ts\n"
+        pause = pause_s * block[0] / N
+        text += "".join(f"{FRICTION[k]:.5f}\t{TIME[k] + pause:.3f}\n" for k in block)
+    (tmp_path / "a.dat").write_text(text, encoding="utf-8")
+    traces = read_blocks(tmp_path / "a.dat")
+    assert len(traces) == records
+    np.testing.assert_allclose(np.concatenate([trace.force_N for trace in traces]), FRICTION, atol=1e-5)

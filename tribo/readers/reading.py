@@ -45,6 +45,7 @@ from tribo.units import QUANTITIES
 
 READERS: dict[str, Machine] = {machine.name: machine for machine in (*BINARY_MACHINES, *TEXT_MACHINES)}
 FATAL = ("time_goes_back", "scale_jump")  # damage for which a table is set aside
+_WRITTEN_IN_BLOCKS = ("mts793", "testsuite")  # one header for each buffer of a long acquisition
 _FLAGS = {"missing_unit": "column_without_unit"}  # of a trace, where it is not the kind of the problem
 _CHOICE = re.compile(r"(.+)#(\d+)")
 _WIDE = 'for several records side by side: friction_force = "* [N]", or "F* [N]" for the columns whose names begin so'
@@ -257,7 +258,7 @@ def read_tables(
                 outcomes = [read_table(machine, *part) for part in parts]
         read, labels, faults, misfits = _sorted_out(outcomes, [table.label for _, table, _ in parts] or [""])
         if read:
-            readings += read
+            readings += _of_one_buffer(read) if machine.name in _WRITTEN_IN_BLOCKS else read
             others += labels
             footer += end
             problems += faults
@@ -266,6 +267,34 @@ def read_tables(
     if problems or not readings:
         raise ReadError(problems or refused)
     return readings, others, footer
+
+
+def _of_one_buffer(read: Sequence[ReadTable]) -> list[ReadTable]:
+    """Blocks of one acquisition, of which each goes on one time step after the last, as the record they are cut from.
+
+    Rows are then counted as if the headers between them were rows as well.
+    """
+    records = [[read[0]]]
+    for block in read[1:]:
+        before, time = records[-1][-1], block.arrays["time"]
+        so_far = before.arrays["time"]
+        same = (block.layout.names, block.columns) == (before.layout.names, before.columns)
+        step = float(np.median(np.diff(so_far))) if so_far.size > 1 else 0.0
+        if same and step > 0 and abs(time[0] - so_far[-1] - step) < step / 2:
+            records[-1].append(block)
+        else:
+            records.append([block])
+    return [
+        replace(
+            blocks[0],
+            layout=replace(blocks[0].layout, end=blocks[-1].layout.end),
+            arrays={q: np.concatenate([b.arrays[q] for b in blocks]) for q in blocks[0].arrays},
+            findings=tuple(problem for b in blocks for problem in b.findings),
+        )
+        if len(blocks) > 1
+        else blocks[0]
+        for blocks in records
+    ]
 
 
 def _lacks_time(outcome: ReadTable | ReadError) -> bool:
