@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 import tribo
 from tribo.errors import CampaignError, TriboError
 from tribo.readers import read_export
-from tribo.records import Ingested
+from tribo.records import Ingested, Phase
 from tribo.traces import phases_of
 
 from .kinds import KINDS
@@ -28,6 +28,7 @@ CLASS = {
 BETWEEN = ("step", "turn")  # phases that may be as short as no time
 SAMPLES = 3
 SHARE = 0.01
+NEAR_S = 1.0  # within which a static force is that of a start of sliding
 TURN = 0.06  # share of a stroke that a reversal which holds the true one may take: a crank turns slowly
 
 
@@ -77,7 +78,12 @@ def sat(kinds: Iterable[str], seeds: Iterable[int], folder: Path) -> list[Seen]:
     found = []
     for k, ((kind, seed), record) in enumerate(zip(asked, records, strict=True)):
         seen = Seen(kind, seed, refused=why)
-        _boundaries(seen, record, folder / "raw" / f"T{k}.csv")
+        phases: tuple[Phase, ...] = ()
+        try:
+            phases = phases_of(read_export(folder / "raw" / f"T{k}.csv"))
+        except TriboError as fault:
+            seen.refused = str(fault)
+        boundaries(seen, record, phases)
         if ingested is not None:
             _windows(seen, record, ingested, f"T{k}")
             _readings(seen, record, ingested, f"T{k}")
@@ -89,12 +95,9 @@ def _of_record(test_id: str, record_id: str) -> bool:
     return test_id.partition("#")[0] == record_id
 
 
-def _boundaries(seen: Seen, record: Record, file: Path) -> None:
+def boundaries(seen: Seen, record: Record, phases: Sequence[Phase]) -> None:
+    """Count the boundaries of a record that were missed, and those that were found where none is."""
     merged: list[tuple[str, float, float]] = []
-    try:
-        phases = phases_of(read_export(file))
-    except TriboError as fault:
-        seen.refused, phases = str(fault), ()
     for phase in phases:
         name = CLASS.get(phase.name, phase.name)
         if merged and merged[-1][0] == name != "stroke":
@@ -135,6 +138,8 @@ def _windows(seen: Seen, record: Record, ingested: Ingested, record_id: str) -> 
         start, end = pull.window_s
         if math.isfinite(pull.static_N) and not record.kind.startswith("strokes"):
             seen.invented += not record.from_rest or pull.peak_s > first_end
+        starts = [start_s for start_s, _ in record.statics]
+        seen.invented += sum(all(abs(r.peak_s - at) > NEAR_S for at in starts) for r in pull.restarts)
         if not math.isfinite(start):
             continue
         inside = (record.time_s >= start) & (record.time_s <= end)
@@ -149,6 +154,10 @@ def _windows(seen: Seen, record: Record, ingested: Ingested, record_id: str) -> 
 
 def _readings(seen: Seen, record: Record, ingested: Ingested, record_id: str) -> None:
     time, clean = record.time_s, record.clean_N
+    for static, found_s, found_N, u_N in _statics(ingested, record_id):
+        at_s, true = min(record.statics, key=lambda start: abs(start[0] - found_s), default=(math.nan, math.nan))
+        if abs(at_s - found_s) < NEAR_S:
+            seen.readings.append((static, found_N, true, abs(found_N - true) <= 1.96 * u_N))
     for test_id, pull in ingested.pulls.items():
         if _of_record(test_id, record_id) and math.isfinite(pull.window_s[0]) and "L" not in record.kind:
             inside = (time >= pull.window_s[0]) & (time <= pull.window_s[1])
@@ -181,6 +190,16 @@ def _readings(seen: Seen, record: Record, ingested: Ingested, record_id: str) ->
             if quantity in r.values and math.isfinite(value):
                 found, low, high = r.values[quantity]
                 seen.readings.append((f"{r.name}: {quantity}", found, value, bool(low <= value <= high)))
+
+
+def _statics(ingested: Ingested, record_id: str) -> Iterator[tuple[str, float, float, float]]:
+    """Kind, time, force and standard uncertainty of every static force that was read of a record, strokes left out."""
+    for test_id, pull in ingested.pulls.items():
+        if _of_record(test_id, record_id) and not {"forward", "backward"} & set(pull.flags):
+            if math.isfinite(pull.static_N):
+                yield "static force", pull.peak_s, pull.static_N, pull.static_u_N
+            for restart in pull.restarts:
+                yield "static force after a hold", restart.peak_s, restart.static_N, restart.static_u_N
 
 
 def _step_truth(record: Record, near_s: float) -> dict[str, float]:

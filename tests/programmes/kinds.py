@@ -31,13 +31,22 @@ def _offset(rng: np.random.Generator) -> float:
     return float(rng.uniform(-0.3, 0.3))
 
 
-def pull(kind: str, channels: str, rng: np.random.Generator, *, stops: bool = False, lost: bool = False) -> Record:
-    """A sled from rest, at 1 to 5 mm/s, with or without a stop of the drive at its end."""
+def pull(
+    kind: str, channels: str, rng: np.random.Generator, *, stops: bool = False, lost: bool = False, shaken: bool = False
+) -> Record:  # fmt: skip
+    """A sled from rest, at 1 to 5 mm/s, with or without a stop of the drive at its end.
+
+    ``shaken``: noise of 2 to 4 % that grows with the force from the first of its rise, on a soft spring.
+    """
     load, v = float(rng.uniform(2, 20)), float(rng.uniform(1, 5)) * MM
     parts = [Segment("rest", rng.uniform(2, 6), 0, load), Segment("slide", rng.uniform(20, 60), v, load)]
     parts += [Segment("end", rng.uniform(4, 12), 0, load)] if stops else []
     contact = _contact(rng, stiffness=float(load * rng.uniform(200, 1500)))
-    return recorded(kind, parts, contact, _noise(rng), channels, rng, offset_N=_offset(rng), lost=lost)
+    noise = _noise(rng)
+    if shaken:
+        noise = replace(noise, rough=(size := float(rng.uniform(0.02, 0.04))), rough_rise=size)
+        contact = replace(contact, stiffness=float(load * np.exp(rng.uniform(np.log(30), np.log(500)))))
+    return recorded(kind, parts, contact, noise, channels, rng, offset_N=_offset(rng), lost=lost)
 
 
 def loaded_pull(kind: str, channels: str, rng: np.random.Generator) -> Record:
@@ -217,5 +226,6 @@ KINDS: dict[str, Made] = dict(
         _of(disc, "disc with lost rows", "S", runs_in=0.2, lost=True),
         *(_of(speed_steps, "steps of speed", c) for c in ("S", "P", "")),
         *(_of(slide_hold_slide, "slide-hold-slide", c) for c in ("S", "P", "")),
+        *(_of(pull, "pull with a rough rise", c, shaken=True) for c in ("S", "P", "")),
     ]
 )

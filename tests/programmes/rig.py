@@ -57,6 +57,7 @@ class Noise:
     tachometer_m_s: float = 0.0
     load: float = 0.002
     position_m: float = 1e-6
+    rough_rise: float = 0.0  # as rough, while the spring is drawn
 
 
 @dataclass
@@ -74,6 +75,7 @@ class Record:
     parts: list[tuple[str, float, float]]  # class, start and end of every phase
     truth: dict[str, float] = field(default_factory=dict)
     from_rest: bool = True
+    statics: list[tuple[float, float]] = field(default_factory=list)  # time and force of every start of sliding
     told: bool = True  # whether what was recorded tells of every boundary
     rate_Hz: float = 50.0
 
@@ -94,13 +96,14 @@ def course(segments: Sequence[Segment], rate_Hz: float) -> tuple[np.ndarray, np.
 
 def force_of(
     speed: np.ndarray, load: np.ndarray, rate_Hz: float, contact: Contact, sliding_already: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Force on the spring (n,), and where the bodies slide."""
+) -> tuple[np.ndarray, np.ndarray, list[tuple[float, float]]]:
+    """Force on the spring (n,), where the bodies slide, and time and force of every start of sliding."""
     step = 1.0 / rate_Hz
     force, slides = np.zeros(speed.size), np.zeros(speed.size, bool)
     slipping, way, f, away, held_s, at_stop, distance = sliding_already, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
     fastest = float(np.abs(speed).max())
     before = 0.0
+    statics: list[tuple[float, float]] = []
 
     def friction(v: float) -> float:
         run_in = contact.runs_in * math.exp(-distance / contact.runs_in_m) + contact.per_m * distance
@@ -124,7 +127,10 @@ def force_of(
                 grown = contact.excess + contact.healing * max(math.log10(max(held_s, 1e-3)), 0.0)
                 static = n * friction(v) * (1.0 + grown)
                 if abs(f) >= static and f * v > 0:
-                    slipping, way, away, before = True, math.copysign(1.0, v), static - n * friction(v), v
+                    slipping, way, before = True, math.copysign(1.0, v), v
+                    slid_s = min((abs(f) - static) / (contact.stiffness * abs(v)), step)  # since it slipped
+                    away = (static - n * friction(v)) * math.exp(-abs(v) * slid_s / contact.length_m)
+                    statics.append((k * step - slid_s, static))
             if slipping:
                 if before and abs(v - before) > 1e-9 * fastest:
                     at_once = contact.sliding * contact.direct * math.log(v / before)
@@ -135,7 +141,7 @@ def force_of(
                 distance += abs(v) * step
                 at_stop = 0.0
         force[k], slides[k] = f, slipping
-    return force, slides
+    return force, slides, statics
 
 
 def rough(n: int, correlated: float, rng: np.random.Generator) -> np.ndarray:
@@ -166,10 +172,11 @@ def recorded(
     """A record of a programme. ``channels`` names what is recorded beside time and force: S, P, L, R for speed,
     position, load and rotation."""
     time, speed, load, firsts = course(segments, rate_Hz)
-    clean, slides = force_of(speed, load, rate_Hz, contact, sliding_already)
+    clean, slides, statics = force_of(speed, load, rate_Hz, contact, sliding_already)
     n = time.size
     travel = np.cumsum(speed) / rate_Hz
-    shaken = clean * (1.0 + noise.rough * slides * rough(n, noise.correlated, rng))
+    sizes = np.where(slides, noise.rough, noise.rough_rise * (np.abs(speed) > 0))
+    shaken = clean * (1.0 + sizes * rough(n, noise.correlated, rng))
     if contact.round_m:
         shaken = shaken * (1.0 + slides * contact.round_share * np.sin(2 * np.pi * travel / contact.round_m))
     told: dict[str, np.ndarray] = {
@@ -189,7 +196,9 @@ def recorded(
         (s.what, float(time[a]), float(time[min(b, n - 1)]))
         for s, a, b in zip(segments, firsts[:-1], firsts[1:], strict=True)
     ]
-    found = Record(kind, time, told, clean, slides, np.abs(speed) > 0, speed, load, parts, rate_Hz=rate_Hz)
+    found = Record(
+        kind, time, told, clean, slides, np.abs(speed) > 0, speed, load, parts, statics=statics, rate_Hz=rate_Hz
+    )
     if lost:
         _lose(found, rng)
     return found

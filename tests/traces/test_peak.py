@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from tribo import read_pull
+from tribo.records import Trace
 from tribo.traces.peak import sharp_apex, with_shape_left_open
 
 RATE_HZ, PEAK_N, PEAK_S, LEVEL_N, NOISE_N = 50.0, 2.0, 3.007, 1.2, 1e-4
@@ -43,3 +46,14 @@ def test_a_top_that_may_be_rounded_adds_the_rms_distance_of_a_rectangular_distri
     assert expected > 20 * NOISE_N
     assert opened.shape_u_N == pytest.approx(expected, rel=1e-3)
     assert (opened.force_N, opened.u_N) == (apex.force_N, apex.u_N)
+
+
+def test_the_static_force_holds_under_noise_of_three_per_cent_that_grows_with_the_force_and_is_correlated() -> None:
+    time, held = np.arange(1500) / 50, 0
+    force = np.clip((time - 3.0) / 1.6, 0.0, 1.0) * np.where(time > 4.6, 1.5 + 0.5 * np.exp(-(time - 4.6) / 0.2), 2.0)
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        rough = lfilter([0.6], [1.0, -0.8], rng.standard_normal(1700))[200:]
+        pull = read_pull(Trace("rough", time, force * (1.0 + 0.03 * rough) + 0.003 * rng.standard_normal(1500)))
+        held += abs(pull.static_N - 2.0) <= 1.96 * pull.static_u_N
+    assert held >= 26

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tribo import read_pull
 from tribo.readers import read_blocks
@@ -212,6 +213,27 @@ def test_a_hold_that_only_a_displacement_tells_parts_no_slide() -> None:
     x = np.cumsum(np.where(time % 120 < 40, 1e-3, 0.0)) / 50 + noise(12000, 3, 1e-6)
     force = np.where(time % 120 < 40, 3.0, 2.6) + noise(12000, 4)
     assert len(split_pulls(Trace("holds", time, force, displacement_m=x))) == 1
+
+
+def rough(size: int, seed: int) -> np.ndarray:
+    """Noise of unit size, correlated over four samples, as bodies that slide make it."""
+    return np.asarray(lfilter([0.6], [1.0, -0.8], np.random.default_rng(seed).standard_normal(size + 200))[200:])
+
+
+def test_a_force_that_is_rough_by_four_per_cent_has_no_stops_and_no_static_force_of_a_restart() -> None:
+    time = np.arange(1500) / 50
+    force = np.clip((time - 3.0) / 1.6, 0.0, 1.0) * np.where(time > 4.6, 1.5 + 0.5 * np.exp(-(time - 4.6) / 0.2), 2.0)
+    for seed in range(16):
+        trace = Trace("rough", time, force * (1.0 + 0.04 * rough(1500, seed)) + noise(1500, seed, 0.003))
+        assert not read_pull(trace).restarts
+
+
+def test_a_level_as_rough_as_a_slide_before_the_force_climbs_is_no_rest() -> None:
+    time = np.arange(2000) / 25
+    force = np.where(time < 20, 1.3, np.where(time < 45, 1.8, 2.1))
+    slides = Trace("ladder", time, force * (1.0 + 0.02 * rough(2000, 1)) + noise(2000, 2, 0.003))
+    assert math.isnan(read_pull(slides, test=TEST).static_N)
+    assert math.isfinite(read_pull(replace(slides, force_N=force + noise(2000, 2, 0.02)), test=TEST).static_N)
 
 
 def test_noise_of_a_tachometer_at_rest_is_no_stroke() -> None:

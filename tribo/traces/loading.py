@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray
-from tribo.traces.signal import Signal, line, running_mean, wander
+from tribo.traces.signal import Signal, correlated_noise, line, running_mean, sample_noise, wander
 
 _LOW, _HIGH = 0.25, 0.75  # share of the first half-way level between which the slope of the rise is taken
 _DETECTABLE = 12.0  # a pull rises by at least this many times the sample noise
@@ -22,6 +22,9 @@ _RISE_OVER_SMOOTHING = 80  # samples of the rise per two samples of smoothing
 _DROP = 5.0  # a fall by this many times the noise ends the search for the first maximum
 _DROP_SHARE = 0.015  # or by this share of the force reached, whichever is more
 _FLAT_SHARE = 0.05  # the climb has ended where its pace is below this share of the loading line's
+_FEWEST_OF_RISE = 8  # samples of a rise from which on it tells of its own noise
+_CORRELATED = 0.3  # correlation of neighbours from which on noise is not white,
+_ROUGHER = 1.5  # and times the noise at rest above which a rise is rougher: chance gives less
 _UNLOADED = 0.5  # share of the sliding level below which a trace's tail is taken as unloading
 _BACK_AT_LEVEL = 0.9
 
@@ -66,6 +69,8 @@ class Loading:
 
     ``depart`` is the index of the first sample below the loading line, at most ``lag`` samples after the line ended,
     ``top`` that of the first maximum of the smoothed force, ``end`` that at which a tail of unloading begins.
+    ``rough_N`` is the noise of a sample at the first maximum as the rise shows it, correlation included, and
+    ``correlated`` the number of samples that one independent sample stands for.
     """
 
     signal: Signal
@@ -75,6 +80,8 @@ class Loading:
     lag: int
     top: int
     end: int
+    rough_N: float = 0.0
+    correlated: float = 1.0
 
     @property
     def onset_s(self) -> float:
@@ -112,12 +119,13 @@ def loading_of(signal: Signal, zero: Zero | None = None) -> Loading:
     margin = max(5.0 * noise, 0.02 * float(smooth[rise.last]))
     depart = departure(time, smooth, rise, margin)
     per_sample = rise.rate * (float(time[rise.last] - time[rise.first]) / max(rise.last - rise.first, 1))
-    top = first_maximum(smooth, rise, depart, per_sample, noise)
+    rough, correlated = _roughness(force, rise, depart, float(smooth[depart]))
+    top = first_maximum(smooth, rise, depart, per_sample, max(noise, rough * math.sqrt(min(correlated / width, 1.0))))
     end = _before_unloading(smooth, top)
     if end - top < 3 and end == smooth.size:
         raise TraceError([*_no_pull(zeroed, 0.0, None), *signal.problems])
     reach = min(margin / per_sample, smooth.size) if per_sample > 0 else 0
-    return Loading(zeroed, known, rise, depart, math.ceil(reach) + 2, top, end)
+    return Loading(zeroed, known, rise, depart, math.ceil(reach) + 2, top, end, rough, correlated)
 
 
 def _no_pull(signal: Signal, start: float, rise: Rise | None) -> list[Problem]:
@@ -196,6 +204,27 @@ def first_maximum(smooth: FloatArray, rise: Rise, depart: int, per_sample: float
     if slow.any():
         end = min(end, max(depart + int(np.argmax(slow)) + width - start, 1))
     return start + int(np.argmax(after[: end + 1]))
+
+
+def _roughness(force: FloatArray, rise: Rise, depart: int, peak_N: float) -> tuple[float, float]:
+    """Noise of a sample of a force at its peak, and how many samples one independent sample stands for.
+
+    How far noise is correlated is told by second differences of the slide over one sample and over several; how large
+    it is by those of the rise, over one sample. What the noise at rest leaves of it is noise of the contact, which
+    grows with the force. No noise where it is white and as large as at rest, or too few samples tell.
+    """
+    rising, sliding = force[rise.first : depart + 1], force[depart:]
+    if rising.size < _FEWEST_OF_RISE or not peak_N > 0:
+        return 0.0, 1.0
+    kept = correlated_noise(sliding, sliding > peak_N / 2.0)[1]
+    kept = kept if kept > _CORRELATED else 0.0
+    onset, rises = max(rise.first - (rise.last - rise.first), 0), sample_noise(rising)
+    at_rest = sample_noise(force[:onset]) if onset >= _FEWEST_OF_RISE else rises
+    if rises > _ROUGHER * at_rest:
+        rises = math.hypot(at_rest, math.sqrt(rises**2 - at_rest**2) * peak_N / float(rising.mean()))
+    elif not kept:
+        return 0.0, 1.0  # noise as the fit of a peak counts it
+    return rises * math.sqrt(3.0 / (3.0 - 4.0 * kept + kept**2)), (1.0 + kept) / (1.0 - kept)
 
 
 def _before_unloading(smooth: FloatArray, top: int) -> int:

@@ -85,12 +85,23 @@ def find_apex(loading: Loading) -> Apex:
         candidates.append(_resolved(time_s, force, around, noise))
     sharp = min((a for a in candidates if a), key=lambda a: a.chi2_red, default=None)
     half = max(length // 2, 2)
-    if sharp and sharp.fits:
-        return with_shape_left_open(sharp, time_s, force, peak, half, noise)
     rounded = rounded_apex(time_s, force, peak, half, noise)
-    if sharp and rounded.chi2_red > _CLEARLY_ROUNDED * sharp.chi2_red:
-        return with_shape_left_open(sharp, time_s, force, peak, half, noise)
-    return rounded
+    if sharp and (sharp.fits or rounded.chi2_red > _CLEARLY_ROUNDED * sharp.chi2_red):
+        return _with_rough_rise(with_shape_left_open(sharp, time_s, force, peak, half, noise), loading)
+    return _with_rough_rise(rounded, loading)
+
+
+def _with_rough_rise(apex: Apex, loading: Loading) -> Apex:
+    """An apex whose uncertainty is that of noise as the rise shows it, correlated and as large as it is at the peak.
+
+    The fit counts noise that is alike all along and not correlated.
+    """
+    counted = loading.signal.noise_N * math.sqrt(max(apex.chi2_red, 1.0))
+    if not (math.isfinite(counted) and counted > 0):
+        return apex
+    share = (apex.u_N / counted) ** 2  # of the variance of a sample that the fit leaves
+    left = min(share * loading.correlated, max(share, 1.0))
+    return replace(apex, u_N=max(apex.u_N, loading.rough_N * math.sqrt(left)))
 
 
 def with_peak_near(loading: Loading, peak_s: float) -> Loading:
@@ -316,6 +327,7 @@ class Motion:
     sliding: tuple[int, int]
     noise_N: float
     problems: tuple[Problem, ...]
+    rough_N: float = 0.0  # noise of a sample at the peak where the rise shows more
 
 
 def in_motion(loading: Loading, apex: Apex, speed_m_s: float | None = None) -> Motion:
@@ -328,7 +340,7 @@ def in_motion(loading: Loading, apex: Apex, speed_m_s: float | None = None) -> M
     first = int(np.searchsorted(signal.time_s, apex.time_s, side="right"))
     return Motion(
         signal.time_s, signal.force_N, signal.smooth_N, travel, loading.zero, loading.rise, onset_s, apex,
-        (first, loading.end), signal.noise_N, signal.problems,
+        (first, loading.end), signal.noise_N, signal.problems, loading.rough_N,
     )  # fmt: skip
 
 
@@ -379,5 +391,5 @@ def within_samples(motion: Motion, apex: Apex) -> Apex:
     if not apex.force_N > highest + _NOISE_AT_TOP * motion.noise_N + between:
         return apex
     missed = max(apex.force_N - highest, motion.rise.rate * step_s / 2.0)
-    u_N = math.hypot(motion.noise_N, missed / math.sqrt(3.0))
+    u_N = math.hypot(max(motion.noise_N, motion.rough_N), missed / math.sqrt(3.0))
     return Apex(apex.time_s, apex.time_u_s, highest, u_N, apex.chi2_red, "highest sample")

@@ -36,6 +36,7 @@ from tribo.traces.loading import loading_of, starting_level
 from tribo.traces.signal import (
     MINIMUM_SAMPLES,
     Signal,
+    correlated_noise,
     line,
     median_of_three,
     noise_of,
@@ -61,10 +62,14 @@ _AS_STEEP = 0.4  # a restart is at least this share as steep as the first rise
 _SLOW_FALL = 3.0  # a force relaxes while the drive stands still for at least this many times the time of the next rise
 _DWELLS = 0.05  # share of the samples of a fall that lie at a level at which the force dwells
 _RESTART = 0.05  # share of the force by which it rises at a restart
+_SWINGS = 8.0  # times noise that is correlated over which it does not swing by itself
 _RETURNS = 0.02  # share of the later part of a record that lies below the force it begins with if it began in motion
 _UNPULLED = 0.3  # share of the usual force below which a record begins with nothing pulled
 _PULLED = 0.5  # the same where nothing tells of the drive
 _QUARTER, _THREE_QUARTERS = 0.25, 0.75  # share of its climb
+_ALIKE = 0.5  # correlation of neighbours above which noise is that of a contact,
+_FEWEST_ALIKE = 200  # samples from which on chance does not give it,
+_AS_ROUGH = 0.5  # and share of the noise of the later force, over that force, from which on a level slides
 _CLIMBS = 4.0  # times its noise by which a force climbs that begins at rest
 _NEAR = 0.1  # share of its swing below the lowest later force from which on a record begins at rest
 _FELT = 12.0  # a friction force is at least this many times the noise
@@ -284,8 +289,8 @@ def _stop_in(height: FloatArray, dip: Range) -> Range | None:
 
 def _relaxations(time_s: FloatArray, height: FloatArray, top: float, noise: float) -> list[Range]:
     """Slow falls of the force, each followed by a rise about as steep as the first one."""
-    turns = turning_points(height, max(_RESTART * top, _FELT * noise))
-    peaks, troughs = turns
+    rough, _ = correlated_noise(height, height > _FALLEN * top)
+    peaks, troughs = turning_points(height, max(_RESTART * top, _FELT * noise, _SWINGS * rough))
     if peaks.size < 2 or troughs.size == 0:
         return []
     first_pace, resolved = _pace(time_s, height, 0, int(peaks[0]))
@@ -362,7 +367,21 @@ def _begins_high(signal: Signal, span: Range, *, turns: bool, told: bool) -> boo
         return True
     height = (np.abs(signal.smooth_N[span[0] : span[1]]) - start) / (level - start)
     quarter, most = int(np.argmax(height > _QUARTER)), int(np.argmax(height > _THREE_QUARTERS))
-    return quarter - (most - quarter) / 2.0 < FEWEST_AT_REST
+    return quarter - (most - quarter) / 2.0 < FEWEST_AT_REST or _as_rough(signal.force_N[span[0] : span[1]], quarter)
+
+
+def _as_rough(force: FloatArray, until: int) -> bool:
+    """Whether a level is rough as bodies that slide are: with noise that is correlated, and as large for its force.
+
+    The noise of a recorder is as large at rest, but hardly correlated.
+    """
+    if until < _FEWEST_ALIKE:
+        return False
+    (first_N, alike), (later_N, _) = (
+        correlated_noise(part, np.ones(part.size, bool)) for part in (force[:until], force[until:])
+    )
+    share = abs(float(np.median(force[:until]))) / max(abs(float(np.median(force[until:]))), 1e-300)
+    return alike > _ALIKE and first_N > _AS_ROUGH * share * later_N > 0.0
 
 
 def phases_of(

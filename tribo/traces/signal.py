@@ -24,6 +24,9 @@ _STANDS_OUT = 2.3  # by this many times the variance of all
 _COSINES = 8  # coefficients after it that tell the noise of its mean
 _FEWEST_OF_LEVEL = 12  # samples from which on a mean has an interval
 _MEANS_OF_LEVEL = 600  # of a long level: thirty for each half wave of the fastest coefficient
+_FAR = 8  # samples over which noise has forgotten itself for the most part
+_FEWEST_OF_NOISE = 60  # samples that tell of it
+_MOST_ALIKE = 0.9  # correlation of neighbours up to which noise is told from the course of a force
 NORMAL_95 = 1.96
 MINIMUM_SAMPLES = 20
 SPIKE_OVER_NOISE = 8.0
@@ -59,6 +62,25 @@ def sample_noise(values: FloatArray) -> float:
     if typical <= 0.0:
         typical = math.sqrt(float(second @ second) / second.size)
     return typical / math.sqrt(6.0)
+
+
+def correlated_noise(values: FloatArray, counts: NDArray[np.bool_]) -> tuple[float, float]:
+    """Standard deviation of noise that may be correlated over a few samples, and the correlation of neighbours.
+
+    Medians of the second differences over one sample and over eight, where ``counts`` (n,) holds at their middles: as
+    :func:`sample_noise`, they are blind to levels and slopes. 0 of fewer than sixty of them.
+    """
+    counts = counts[_FAR:-_FAR]
+    if np.count_nonzero(counts) < _FEWEST_OF_NOISE:
+        return 0.0, 0.0
+    middle = values[_FAR:-_FAR]
+    near = values[_FAR + 1 : values.size - _FAR + 1] - 2.0 * middle + values[_FAR - 1 : -_FAR - 1]
+    far = values[2 * _FAR :] - 2.0 * middle + values[: -2 * _FAR]
+    near_N, far_N = (MEDIAN_TO_SD * float(np.median(np.abs(second[counts]))) for second in (near, far))
+    alike = np.linspace(0.0, _MOST_ALIKE, 91)
+    over_far = 6.0 - 8.0 * alike**_FAR + 2.0 * alike ** (2 * _FAR)
+    best = int(np.argmin(np.abs((6.0 - 8.0 * alike + 2.0 * alike**2) / over_far * far_N**2 - near_N**2)))
+    return far_N / math.sqrt(float(over_far[best])), float(alike[best])
 
 
 def noise_of(force: FloatArray) -> float:
@@ -101,10 +123,14 @@ def running_mean(values: FloatArray, width: int) -> FloatArray:
     if half == 0:
         return values
     total = np.concatenate(([0.0], np.cumsum(values)))
-    index = np.arange(values.size)
-    low = np.maximum(index - half, 0)
-    high = np.minimum(index + half + 1, values.size)
-    return np.asarray((total[high] - total[low]) / (high - low))
+    found, width, n = np.empty(values.size), 2 * half + 1, values.size
+    if n > width:  # without arrays of indices, which are larger than a long record
+        np.subtract(total[width:], total[:-width], out=found[half : n - half])
+        found[half : n - half] /= width
+    edges = np.arange(n) if n <= width else np.concatenate((np.arange(half), np.arange(n - half, n)))
+    low, high = np.maximum(edges - half, 0), np.minimum(edges + half + 1, n)
+    found[edges] = (total[high] - total[low]) / (high - low)
+    return found
 
 
 def turning_points(force: FloatArray, least: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
