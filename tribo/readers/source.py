@@ -41,6 +41,7 @@ _WIDE_BOMS = {
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
+_AS_TEXT = "a text export: save the record as text or CSV in the program that wrote it"
 _CELL = re.compile(r"[^\t;,|\n\"]+")
 # Code pages of Central Europe, China, Japan, Korea, Taiwan and Russia: recognised by names of columns in them.
 _BY_NAMES = ("cp1250", "gb18030", "cp932", "cp949", "big5", "cp1251", "iso8859-2")
@@ -278,7 +279,7 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
         little = len(odd) > 8 and not any(odd) and all(even)
         encoding = "utf-16-le" if little else "utf-16-be"
         if not (big or little) or isinstance(raw, mmap.mmap):
-            raise ReadError(Problem("binary", "this is not a text file", file=file, allowed="a text export"))
+            raise ReadError(Problem("binary", "this is not a text file", file=file, allowed=_AS_TEXT))
         data = raw.decode(encoding, errors="replace").encode("utf-8")
     else:
         encoding, data = ("utf-8-sig" if bom else _narrow_encoding(raw)), raw
