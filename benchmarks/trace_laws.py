@@ -3,7 +3,7 @@
 Virtual records come from ``tests/support/virtual_slips.py``, which shares nothing with the code that reads them. Every
 record draws its own law, machine and noise::
 
-    python benchmarks/trace_laws.py run --count 250 -o rows.jsonl       # of each of the four laws; continues rows.jsonl
+    python benchmarks/trace_laws.py run --count 250 -o rows.jsonl       # of each law; continues rows.jsonl
     python benchmarks/trace_laws.py table rows.jsonl
 
 Rows are appended one by one; a stopped exam goes on where it ended. Seeds of records: 26000 + number.
@@ -23,12 +23,21 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from support.virtual_slips import slips, velocity_step
+from support.virtual_slips import ladder, slips, velocity_step
 
 from tribo.slider import speed_steps
-from tribo.tracelaws import SLIP_LAWS, STEP_LAWS, chosen_slip_laws, chosen_step_laws, fit_laws, fit_slips
+from tribo.tracelaws import (
+    SLIP_LAWS,
+    SPEED_LAWS,
+    STEP_LAWS,
+    chosen_slip_laws,
+    chosen_step_laws,
+    fit_laws,
+    fit_slips,
+    fit_speeds,
+)
 
-TRUTHS = ("coulomb", "ageing", "dieterich", "ruina")
+TRUTHS = ("coulomb", "ageing", "dieterich", "ruina", "stribeck", "viscous", "constant", "logarithmic")
 
 
 def slip_record(rng: np.random.Generator, truth: str):
@@ -73,6 +82,32 @@ def step_record(rng: np.random.Generator, truth: str):
     return record, known, (speed_steps([0.0, 80.0], list(speeds)), noise)
 
 
+def speed_record(rng: np.random.Generator, truth: str):
+    """Six to ten speeds over two to four decades, up and down; means over the last three quarters of each stretch."""
+    count, decades = int(rng.integers(6, 11)), float(rng.uniform(2.0, 4.0))
+    lowest = float(10 ** rng.uniform(-6, -4))
+    up = np.geomspace(lowest, lowest * 10**decades, count)
+    speeds = np.concatenate([up, up[::-1]])
+    mu_d = float(rng.uniform(0.1, 0.5))
+    size = float(rng.uniform(0.1, 0.5)) * mu_d  # by which friction changes over the ladder
+    v_s = float(lowest * 10 ** (decades * rng.uniform(0.25, 0.75)))
+    known = {"mu_d": mu_d}
+    friction = np.full(speeds.size, mu_d)
+    if truth == "logarithmic":
+        per = size / math.log(speeds.max() / lowest)
+        friction = mu_d + per * np.log(speeds)
+        known = {"mu_at_1_m_s": mu_d, "per_e_fold": per}
+    elif truth != "constant":
+        viscous = size / speeds.max() * float(rng.uniform(0.2, 1.0))
+        friction = friction + viscous * speeds
+        known["viscous_s_per_m"] = viscous
+    if truth == "stribeck":
+        friction = friction + size * np.exp(-speeds / v_s)
+        known |= {"mu_s": mu_d + size, "v_s_m_s": v_s}
+    _, mu = ladder(rng, speeds, friction, scatter=float(rng.uniform(0.02, 0.12)) * size, noise=0.1 * size)
+    return (speeds, mu.reshape(speeds.size, -1)[:, mu.size // speeds.size // 4 :].mean(axis=1)), known
+
+
 def examined(truth: str, number: int) -> dict:
     """One record: what was fitted under its own law beside the truth, and which laws were chosen."""
     rng = np.random.default_rng([26000 + number, TRUTHS.index(truth)])
@@ -82,6 +117,10 @@ def examined(truth: str, number: int) -> dict:
         made = [fit_slips(t, force, law, load, speed) for law in SLIP_LAWS]
         if made[0] is None:
             return {"truth": truth, "number": number, "chosen": []}
+        chosen = [law.law for law in chosen_slip_laws(made)]
+    elif truth in SPEED_LAWS:
+        (speeds, mu), known = speed_record(rng, truth)
+        made = [fit_speeds(speeds, mu, law) for law in SPEED_LAWS]
         chosen = [law.law for law in chosen_slip_laws(made)]
     else:
         (t, mu), known, (drive, noise) = step_record(rng, truth)
@@ -109,6 +148,7 @@ def table(rows: list[dict]) -> str:
             error = f"{100 * np.median([abs(r[1] / r[0] - 1) for r in told]):.2f} %" if told else "-"
             seen = f"{100 * len(told) / len(found):.0f} %"
             lines.append(f"| {truth} | `{name}` | {len(found)} | {seen} | {share} | {error} |")
+        of = [row for row in of if row["chosen"] is not None]  # of records that were read before a change of the choice
         alone = sum(row["chosen"] == [truth] for row in of)
         tied = sum(truth in row["chosen"] and len(row["chosen"]) > 1 for row in of)
         nothing = sum(not row["chosen"] for row in of)
@@ -123,6 +163,7 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path)
     parser.add_argument("--count", type=int, default=250)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--laws", nargs="+", choices=TRUTHS, default=TRUTHS)
     given = parser.parse_args()
     file = given.file or given.out
     kept = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
@@ -133,7 +174,7 @@ def main() -> None:
     done = {(row["truth"], row["number"]) for row in kept}
     with file.open("a") as out:
         for number in range(given.first, given.first + given.count):
-            for truth in TRUTHS:
+            for truth in given.laws:
                 if (truth, number) not in done:
                     out.write(json.dumps(examined(truth, number)) + "\n")
                     out.flush()

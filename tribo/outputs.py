@@ -498,7 +498,7 @@ PRODUCTS = (
     ),
     Product(
         "tracelaws.csv", "fit",
-        "friction law and machine read from records with stick-slip, steps of speed or strokes; with `--trace-law`.",
+        "friction law and machine read from records with stick-slip, strokes or several speeds; with `--trace-law`.",
         TRACE_LAWS, "tribo.report.tables:trace_laws_table",
     ),
     Product(

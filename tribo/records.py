@@ -897,7 +897,7 @@ class TraceLaw:
     Parameters
     ----------
     law : str
-        Name of the law, as in :data:`tribo.slider.SLIDER_LAWS`, or in ``tribo.tracelaws.DRIVEN_LAWS`` of strokes.
+        Name of the law, as in :data:`tribo.slider.SLIDER_LAWS`, or in ``tribo.tracelaws``.
     parameters : tuple of TraceLawParameter
         Parameters of law and machine with intervals.
     log_likelihood : float
@@ -906,9 +906,9 @@ class TraceLaw:
     samples : int
         Slips, strokes or samples that count.
     evidence : str
-        "slips", "strokes" or "steps of speed".
+        "slips", "strokes", "speeds" or "steps of speed".
     scores : tuple of float
-        Log density of each slip or stroke left out of the fit; empty for steps of speed.
+        Log density of each slip, stroke or stretch left out of the fit; empty for steps of speed.
     test_id : str
         The test.
     """

@@ -1,8 +1,8 @@
-"""Friction laws and machines read from whole traces: from slips, from steps of speed, and from strokes to and fro.
+"""Friction laws and machines read from whole traces: from slips, steps of speed, strokes to and fro, and speeds.
 
 Which records of a campaign hold a law beyond mu and tau0, slips under Coulomb friction or its growth at rest (maximum
-likelihood over slips), rate and state from steps of speed (least squares of whitened residuals), and friction with
-backlash from a drive that goes to and fro (least squares, with strokes as the evidence).
+likelihood over slips), rate and state from steps of speed (least squares of whitened residuals), friction with backlash
+from a drive that goes to and fro (least squares, with strokes as the evidence), and Stribeck friction over speed.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ _FEWEST_IN_SLIP = 8  # samples between peak and trough from which on the slip it
 _LOADING = (0.3, 0.95)  # share of the time of a loading between which its slope is taken
 _OUTLIER = 5.0  # median deviations from the median beyond which a slip does not count
 _CLEAR = 2.0  # standard errors by which a law must predict slips left out better
+_LIKELIER = 3.0  # log likelihood by which one of two laws must be better: a ratio of 20 to 1
 
 
 def fit_slips(
@@ -137,12 +138,14 @@ def _of_every_slip(
 def _shape(
     time: FloatArray, force: FloatArray, p: int, q: int, start: int, pace: float
 ) -> FloatArray | None:
-    """Static and sliding force, frequency and damping rate of one slip, by least squares about it.
+    """Static and sliding force, frequency and damping rate of one slip, by least squares about it; None if it has none.
 
     Noise shifts the estimates of one slip, and does so in all slips alike. How far is found by a second fit, to the
     first one with its residuals in reversed order, and taken off (Efron and Tibshirani, An Introduction to the
     Bootstrap, 1993, chapter 10).
     """
+    if not force[p] > force[q]:  # a fall of the calmed force alone
+        return None
     width = q - p
     a, b = max(p - max(2 * width, 20), start + (p - start) // 3), min(q + width // 2, time.size)
     t, f = time[a:b] - time[p], force[a:b]
@@ -289,9 +292,9 @@ def _scores(before: FloatArray, slope: FloatArray, stuck: FloatArray, law: str) 
 
 
 def clearly_better(one: TraceLaw, other: TraceLaw) -> bool:
-    """Whether a law predicts slips left out better than another, by twice the standard error of the difference."""
+    """Whether a law predicts slips left out better than another: by twice the standard error, and by 20 to 1."""
     gain = np.array(one.scores) - np.array(other.scores)
-    return bool(gain.mean() > _CLEAR * gain.std(ddof=1) / math.sqrt(gain.size))
+    return bool(gain.sum() > max(_CLEAR * gain.std(ddof=1) * math.sqrt(gain.size), _LIKELIER))
 
 
 Filter = Callable[[FloatArray], FloatArray]
@@ -369,8 +372,16 @@ def _fit_near(
         value = math.exp(best[k])
         low, high = value * math.exp(-reach), value * math.exp(reach)
         rows.append(TraceLawParameter(name, value, low, high, unit, bool(spread[k] < _UNTOLD_SD)))
-    log_likelihood = -0.5 * n * math.log(float(whitened @ whitened) / n)
-    return TraceLaw(law, tuple(rows), log_likelihood, n, "steps of speed")
+    return TraceLaw(law, tuple(rows), white_likelihood(whitened, time.size), n, "steps of speed")
+
+
+def white_likelihood(whitened: FloatArray, samples: int) -> float:
+    """Log likelihood of a record of so many samples by its whitened residuals, without what two laws share.
+
+    Filters of two laws differ in length. If each counted its own samples, one sample more would weigh as much as many
+    better ones.
+    """
+    return -0.5 * samples * math.log(float(whitened @ whitened) / whitened.size)
 
 
 def _linear(name: str, value: float, half: float, told: bool) -> TraceLawParameter:
@@ -486,7 +497,6 @@ def whitening(residuals: FloatArray) -> Filter:
 
 _STEADY = "steady sliding"
 _SMALLEST_STEP = math.log(1.3)  # change of the logarithm of the speed from which on it is a step
-_LIKELIER = 3.0  # log likelihood by which one of two laws of equal size must be better: a ratio of 20 to 1
 
 
 def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]:
@@ -498,12 +508,15 @@ def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]
         The campaign with its traces.
     law
         "auto", or the name of one law. Under "auto" the ageing law is chosen over Coulomb's where it predicts slips
-        left out better by twice the standard error, and the ageing law of Dieterich or the slip law of Ruina where its
-        likelihood is 20 times that of the other; of a drive that goes to and fro, a law of ``DRIVEN_LAWS`` where none
-        predicts strokes left out better by twice the standard error. Laws that are tied are all given.
+        left out clearly better (by twice the standard error, and by 20 to 1), the ageing law of Dieterich or the slip
+        law of Ruina where its likelihood is 20 times that of the other; of a drive that goes to and fro, a law of
+        ``DRIVEN_LAWS`` where none clearly predicts strokes left out better; of seven stretches at five speeds or more
+        (of a record, or of the records of one sample at one load), a law of ``SPEED_LAWS`` in the same way. Laws that
+        are tied are all given.
     """
     tests = {test.test_id: test for test in ingested.campaign.tests}
     found: list[TraceLaw] = []
+    pooled: dict[str, list[tuple[float, float]]] = {}
     for name, pieces in groupby(ingested.traces.items(), key=lambda item: _record_of(item[0])):
         traces = list(pieces)
         test, pull = tests.get(traces[0][0]), ingested.pulls.get(traces[0][0])
@@ -515,6 +528,18 @@ def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]
             *_of_strokes(traces, law),
         ]
         found += [replace(one, test_id=one.test_id or name) for one in fitted]
+        steady = [
+            (phase.speed_m_s, phase.force_N / test.normal_load_N)
+            for test_id, _ in traces for phase in ingested.pulls[test_id].phases if phase.name == _STEADY
+        ] if all(test_id in ingested.pulls for test_id, _ in traces) else []  # fmt: skip
+        by_speed = list(_of_speeds(steady, name, law))
+        found += by_speed
+        speed = test.speed_m_s or ingested.campaign.pull_speed_m_s or math.nan
+        if not by_speed:
+            whole = steady or [(speed, pull.sliding_N / test.normal_load_N)]
+            pooled.setdefault(f"{test.sample}, {test.normal_load_N:g} N", []).extend(whole)
+    for name, stretches in pooled.items():
+        found += _of_speeds(stretches, name, law)
     return tuple(found)
 
 
@@ -559,7 +584,7 @@ def _of_slips(
 
 
 def chosen_slip_laws(fitted: Sequence[TraceLaw]) -> list[TraceLaw]:
-    """Those that no other law beats on slips left out, by twice the standard error of the difference."""
+    """Those that no other law clearly beats on slips left out."""
     return [law for law in fitted if not any(clearly_better(other, law) for other in fitted)]
 
 
@@ -809,3 +834,124 @@ def _driven_fit(
     ]  # fmt: skip
     best = min(found, key=lambda fitted: float(fitted.cost))
     return np.asarray(best.x), np.asarray(best.jac), np.asarray(best.fun)
+
+
+_SPEED_PARAMETERS = {
+    "constant": (("mu_d", "1"),),
+    "viscous": (("mu_d", "1"), ("viscous_s_per_m", "s/m")),
+    "logarithmic": (("mu_at_1_m_s", "1"), ("per_e_fold", "1")),
+    "stribeck": (("mu_d", "1"), ("mu_s", "1"), ("viscous_s_per_m", "s/m"), ("v_s_m_s", "m/s")),
+}
+SPEED_LAWS = tuple(_SPEED_PARAMETERS)
+_FEWEST_SPEEDS, _FEWEST_STRETCHES = 5, 7
+_SAME_SPEED = 0.05  # of the logarithm: speeds closer than this are one speed, left out together
+_PLACES, _REACH = 160, (0.1, 3.0)  # values of v_s tried, from a tenth of the lowest speed to thrice the highest
+_DRAWS = 4000  # of the parameters, for their intervals
+
+
+def fit_speeds(speed_m_s: FloatArray, friction: FloatArray, law: str = "stribeck") -> TraceLaw | None:
+    """Friction over speed from stretches of steady sliding, one value a stretch; None with too few of them.
+
+    "constant" is mu_d, "viscous" mu_d + e v, "logarithmic" a line in ln v, and "stribeck" mu_d + (mu_s - mu_d)
+    exp(-v / v_s) + e v, the law of the slider with exponent 1. Least squares over stretches, all alike, for the scatter
+    from stretch to stretch is larger than what one of them tells of its mean. For a given v_s the law is linear; v_s
+    and its interval follow from the likelihood of each, and the others' intervals are averaged over it.
+
+    Parameters
+    ----------
+    speed_m_s, friction
+        Speed and friction force over normal load of every stretch, shape (n,). At least seven stretches at five speeds.
+    law : str
+        Name in ``tribo.tracelaws.SPEED_LAWS``.
+
+    Returns
+    -------
+    TraceLaw
+        With 95 % intervals; ``viscous_s_per_m`` is the viscous friction e over the normal load. ``scores`` are log
+        densities of the stretches of each speed by a fit without that speed. Where v_s is not known within a factor
+        of ten, or static minus sliding friction may be zero, the law cannot be told.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tribo.tracelaws import fit_speeds
+    >>> v = np.geomspace(1e-5, 1e-2, 12)
+    >>> mu = 0.3 + 0.1 * np.exp(-v / 2e-4) + 2.0 * v + 1e-3 * np.random.default_rng(0).standard_normal(12)
+    >>> law = fit_speeds(v, mu)
+    >>> round(law["mu_s"].value, 2), round(1e4 * law["v_s_m_s"].value, 1)
+    (0.4, 2.0)
+    """
+    v, mu = np.asarray(speed_m_s, float), np.asarray(friction, float)
+    order = np.argsort(v)
+    group = np.empty(v.size, int)
+    group[order] = np.concatenate([[0], np.cumsum(np.diff(np.log(v[order])) > _SAME_SPEED)])
+    if v.size < _FEWEST_STRETCHES or group.max() + 1 < _FEWEST_SPEEDS:
+        return None
+    made, weights, values = _over_speed(v, mu, law)
+    best = int(np.argmax(weights))
+    rng = np.random.default_rng(0)
+    free = v.size - made[0][0].size - (law == "stribeck")
+    chosen = rng.choice(values.size, _DRAWS, p=weights)
+    heavy = np.sqrt(free / rng.chisquare(free, _DRAWS))[:, None]
+    centres = np.array([made[k][0] for k in chosen])
+    linear = centres + heavy * np.array([made[k][2] @ rng.standard_normal(centres.shape[1]) for k in chosen])
+    centre = made[best][0].copy()
+    if law == "stribeck":
+        told = bool(np.quantile(linear[:, 1], 0.025) > 0.0 or np.quantile(linear[:, 1], 0.975) < 0.0)
+        linear[:, 1] += linear[:, 0]
+        centre = np.append(centre, values[best])
+        centre[1] += centre[0]
+        linear = np.column_stack([linear, values[chosen]])
+    low, high = np.quantile(linear, [0.025, 0.975], axis=0)
+    rows = []
+    for k, (name, unit) in enumerate(_SPEED_PARAMETERS[law]):
+        known = told and high[-1] < 10.0 * low[-1] if law == "stribeck" else high[k] - low[k] < 2.0 * abs(centre[k])
+        rows.append(TraceLawParameter(name, float(centre[k]), float(low[k]), float(high[k]), unit, bool(known)))
+    scores = np.empty(v.size)
+    for one in range(int(group.max()) + 1):
+        out = group == one
+        parts, likely, places = _over_speed(v[~out], mu[~out], law)
+        k = int(np.argmax(likely))
+        beta, scale, root = parts[k]
+        X = _columns(v[out], law, places[k])
+        freedom = int((~out).sum()) - beta.size - (law == "stribeck")
+        spread = np.sqrt(scale**2 + ((X @ root) ** 2).sum(axis=1))
+        scores[out] = student.logpdf((mu[out] - X @ beta) / spread, freedom) - np.log(spread)
+    return TraceLaw(law, tuple(rows), float(scores.sum()), v.size, "speeds", tuple(scores))
+
+
+def _columns(v: FloatArray, law: str, v_s: float) -> FloatArray:
+    one = np.ones_like(v)
+    if law == "stribeck":
+        return np.column_stack([one, np.exp(-v / v_s), v])
+    return np.column_stack({"constant": [one], "viscous": [one, v], "logarithmic": [one, np.log(v)]}[law])
+
+
+def _over_speed(
+    v: FloatArray, mu: FloatArray, law: str
+) -> tuple[list[tuple[FloatArray, float, FloatArray]], FloatArray, FloatArray]:
+    """Linear fits (values, scatter, root of their covariance) for every v_s, the weight of each, and the v_s."""
+    stribeck = law == "stribeck"
+    places = np.geomspace(_REACH[0] * v.min(), _REACH[1] * v.max(), _PLACES) if stribeck else np.ones(1)
+    made, squares = [], np.empty(places.size)
+    for k, v_s in enumerate(places):
+        X = _columns(v, law, v_s)
+        size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+        values, vectors = np.linalg.eigh((X / size).T @ (X / size))
+        root = vectors / np.sqrt(np.maximum(values, 1e-12)) / size[:, None]
+        beta = root @ root.T @ X.T @ mu
+        squares[k] = max(float(np.sum((mu - X @ beta) ** 2)), 1e-300)
+        scale = math.sqrt(squares[k] / (v.size - X.shape[1] - stribeck))
+        made.append((beta, scale, scale * root))
+    weights = (squares / squares.min()) ** (-0.5 * (v.size - made[0][0].size))
+    return made, weights / weights.sum(), places
+
+
+def _of_speeds(
+    stretches: Sequence[tuple[float, float]], name: str, law: str
+) -> Iterable[TraceLaw]:
+    """Friction over speed of the stretches (speed, friction) of a record, or of the records of one sample and load."""
+    wanted = [one for one in SPEED_LAWS if law in ("auto", one)]
+    speed, friction = np.array([pair for pair in stretches if pair[0] > 0 and math.isfinite(pair[1])]).reshape(-1, 2).T
+    fitted = [fit_speeds(speed, friction, one) for one in wanted]
+    yield from chosen_slip_laws([replace(one, test_id=name) for one in fitted if one is not None])

@@ -2,7 +2,8 @@
 
 Slips: a fixed-step Runge-Kutta integration of a slider that is pulled through a spring and a damper, whose static
 friction is drawn anew for every slip. Strokes: relaxation in small steps. Steps of speed: scipy's odeint on friction
-and the state variable theta. Noise is autoregressive of order one on top of white noise.
+and the state variable theta. A ladder of speeds: stretches of steady sliding. Noise is autoregressive of
+order one on top of white noise.
 """
 
 from __future__ import annotations
@@ -114,3 +115,19 @@ def strokes(
         if abs(pull) > limit:
             x += math.copysign(0.5 * (abs(pull) - limit) / stiffness, pull)
     return drive[::steps], force[::steps] + coloured(rng, n, noise_N)
+
+
+def ladder(
+    rng: np.random.Generator, speeds_m_s: np.ndarray, friction: np.ndarray, *, scatter: float, noise: float,
+    stretch_s: float = 20.0, rate_Hz: float = 10.0,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Time and friction of a record that goes through speeds one after another, each friction met after a second.
+
+    Every stretch lies off its friction by a normal ``scatter`` of its own.
+    """
+    n = round(stretch_s * rate_Hz)
+    levels = friction + scatter * rng.standard_normal(len(speeds_m_s))
+    before = np.concatenate([levels[:1], levels[:-1]])
+    fade = np.exp(-np.arange(n) / rate_Hz)
+    mu = (levels[:, None] + (before - levels)[:, None] * fade).ravel()
+    return np.arange(mu.size) / rate_Hz, mu + coloured(rng, mu.size, noise)

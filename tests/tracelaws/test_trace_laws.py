@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import on_the_command_line
 import pytest
-from support.virtual_slips import slips, strokes, velocity_step
+from support.virtual_slips import ladder, slips, strokes, velocity_step
 
+from tribo import tracelaws
 from tribo.slider import SliderConfig, constant_speed, recorded_displacement, simulate_slider, speed_steps
 from tribo.tracelaws import (
+    SPEED_LAWS,
     chosen_slip_laws,
     chosen_step_laws,
     clearly_better,
@@ -20,7 +22,9 @@ from tribo.tracelaws import (
     fit_driven,
     fit_laws,
     fit_slips,
+    fit_speeds,
     slip_force,
+    white_likelihood,
     whitening,
 )
 
@@ -181,3 +185,58 @@ def test_the_command_reads_a_drive_that_goes_to_and_fro_and_takes_its_strokes_fo
         found = {row["parameter"]: row for row in csv.DictReader(file) if row["law"] == "driven_directions"}
     assert float(found["forward_N"]["value"]) == pytest.approx(12e3, rel=0.05)
     assert float(found["backward_N"]["value"]) == pytest.approx(8e3, rel=0.05)
+
+
+def test_a_filter_that_loses_samples_makes_no_law_likelier():
+    white = 1e-4 * np.random.default_rng(2).standard_normal(1000)
+    assert white_likelihood(white[8:], 1000) == pytest.approx(white_likelihood(white, 1000), abs=8.0)
+
+
+def test_a_fall_of_the_calmed_force_alone_has_no_shape_of_a_slip():
+    time = np.arange(200) / 1000.0
+    force = 1.0 + 1e-3 * time
+    assert tracelaws._shape(time, force, 100, 120, 20, 1e-3) is None
+
+
+LADDER = np.concatenate([np.geomspace(1e-5, 1e-2, 8), np.geomspace(1e-2, 1e-5, 8)])
+
+
+def test_stribeck_friction_is_recovered_from_a_ladder_of_speeds_and_beats_the_other_laws_on_speeds_left_out():
+    truth = {"mu_d": 0.25, "mu_s": 0.40, "viscous_s_per_m": 5.0, "v_s_m_s": 3e-4}
+    rng = np.random.default_rng(8)
+    friction = 0.25 + 0.15 * np.exp(-LADDER / 3e-4) + 5.0 * LADDER + 0.004 * rng.standard_normal(16)
+    made = [fit_speeds(LADDER, friction, law) for law in SPEED_LAWS]
+    assert [law.law for law in chosen_slip_laws([law for law in made if law])] == ["stribeck"]
+    for name, value in truth.items():
+        p = made[-1][name]
+        assert p.told
+        assert p.low < value < p.high
+        assert p.high - p.low < value
+
+
+def test_constant_friction_tells_no_stribeck_law_and_four_speeds_tell_none():
+    rng = np.random.default_rng(9)
+    friction = 0.3 + 0.004 * rng.standard_normal(16)
+    made = [fit_speeds(LADDER, friction, law) for law in SPEED_LAWS]
+    assert not made[-1]["v_s_m_s"].told
+    assert "constant" in [law.law for law in chosen_slip_laws([law for law in made if law])]
+    assert fit_speeds(np.repeat([1e-4, 1e-3, 1e-2, 1e-1], 4), friction) is None
+
+
+def test_the_command_fits_stribeck_friction_to_the_steady_stretches_of_a_ladder_of_speeds(tmp_path: Path):
+    friction = 0.25 + 0.15 * np.exp(-LADDER / 3e-4)
+    time, mu = ladder(np.random.default_rng(3), LADDER, friction, scatter=0.003, noise=0.003)
+    place = np.cumsum(np.repeat(LADDER, 200)) / 10.0
+    folder = tmp_path / "c"
+    (folder / "raw").mkdir(parents=True)
+    (folder / "campaign.toml").write_text('[campaign]\ntitle = "t"\n[patterns.F]\ncavity = "none"\n')
+    (folder / "tests.csv").write_text("test_id,file,sample,normal_load_N\nT1,raw/a.csv#*,F,10\n")
+    rows = [f"{t:.2f},{10 * m:.5f},{1e3 * x:.6f},10" for t, m, x in zip(time, mu, place, strict=True)]
+    head = "Time (s),Friction force (N),Position (mm),Normal force (N)\n"
+    (folder / "raw" / "a.csv").write_text(head + "\n".join(rows) + "\n")
+    result = on_the_command_line.run("fit", folder, "-o", tmp_path / "out", "--trace-law", "stribeck")
+    assert result.exit_code == 0, result.stderr
+    with open(tmp_path / "out" / "tracelaws.csv", newline="") as file:
+        found = {row["parameter"]: row for row in csv.DictReader(file)}
+    assert float(found["mu_s"]["value"]) == pytest.approx(0.40, rel=0.03)
+    assert float(found["v_s_m_s"]["low"]) < 3e-4 < float(found["v_s_m_s"]["high"])

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 _TRACE_LAWS = (
     "auto", "coulomb", "ageing", "dieterich", "ruina", "driven", "driven_backlash", "driven_directions",
-    "driven_springy_backlash",
+    "driven_springy_backlash", "constant", "viscous", "logarithmic", "stribeck",
 )  # fmt: skip
 
 
@@ -80,8 +80,9 @@ def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 @click.option(
     "--trace-law", type=click.Choice(_TRACE_LAWS), metavar="LAW",
     help="Read a law and the machine from whole records with stick-slip (coulomb, ageing), steps of speed "
-    "(dieterich, ruina) or strokes to and fro (driven, driven_backlash, driven_directions, driven_springy_backlash), "
-    "with intervals; auto: the law that fits. Writes tracelaws.csv.",
+    "(dieterich, ruina), strokes to and fro (driven, driven_backlash, driven_directions, driven_springy_backlash), "
+    "or several speeds (constant, viscous, logarithmic, stribeck), with intervals; auto: the law that fits. Writes "
+    "tracelaws.csv.",
 )
 @fit_options
 @command_options
