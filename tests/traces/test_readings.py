@@ -199,6 +199,16 @@ def test_static_friction_that_grows_with_the_hold_heals_by_so_much_a_decade() ->
     assert [r.hold_s for r in found if r.name == "hold"] == [1.0, 10.0, 100.0, 1000.0]
 
 
+def test_static_forces_that_lie_on_a_line_by_chance_leave_their_own_uncertainty_to_the_healing() -> None:
+    """Four holds a decade apart, 0.01 N each: 1.96 0.01 N / sqrt(5) a decade."""
+    time = np.arange(1000) / 10
+    trace = Trace("disc", time, 4.0 + noise(1000, 1))
+    restarts = tuple(Restart(10.0**k, 100.0 * k, 50.0, 4.3 + 0.1 * k, 0.01, 4.0, 0.01) for k in range(4))
+    pull = replace(evaluate(trace, PullOptions(test=TEST, contact="rotary")), restarts=restarts)
+    (healing,) = (r for r in readings_of([Part(TEST, trace, pull)]) if r.name == "healing")
+    assert healing.values["healing_N_per_decade"] == pytest.approx((0.1, 0.0912, 0.1088), abs=1e-4)
+
+
 def test_one_pull_from_rest_has_no_further_readings(small_campaign: Path) -> None:
     ingested = tribo.ingest(tribo.load_campaign(small_campaign))
     assert ingested.readings == ()

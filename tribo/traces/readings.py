@@ -465,18 +465,23 @@ def _holds(part: Part) -> list[Reading]:
         about = {"normal_load_N": load, "hold_s": restart.hold_s, "values": values}
         found.append(Reading(part.test.test_id, "hold", restart.stop_s, restart.peak_s, **about))  # type: ignore[arg-type]
         if math.isfinite(restart.static_N + pull.sliding_N) and restart.hold_s > 0:
-            gained.append((math.log10(restart.hold_s), restart.static_N - pull.sliding_N))
-    x, y = np.array(gained).reshape(-1, 2).T
+            gained.append((math.log10(restart.hold_s), restart.static_N - pull.sliding_N, restart.static_u_N))
+    x, y, u = np.array(gained).reshape(-1, 3).T
     if x.size >= _FEWEST_HOLDS and np.ptp(x) > math.log10(2.0):
-        found.append(_healing(part, found, x, y))
+        found.append(_healing(part, found, x, y, u))
     return found
 
 
-def _healing(part: Part, holds: Sequence[Reading], log_s: FloatArray, gain_N: FloatArray) -> Reading:
+def _healing(
+    part: Part, holds: Sequence[Reading], log_s: FloatArray, gain_N: FloatArray, static_u_N: FloatArray
+) -> Reading:
+    """Growth of the static force per tenfold hold; its interval by the scatter about the line, or by what the static
+    forces leave open where that is more: a few of them may lie on a line by chance."""
     slope, x0, y0 = line(log_s, gain_N)
-    rest = gain_N - y0 - slope * (log_s - x0)
-    u = math.sqrt(float(rest @ rest) / (log_s.size - 2) / float(((log_s - x0) ** 2).sum()))
-    half = of_student(log_s.size - 2) * u
+    rest, away = gain_N - y0 - slope * (log_s - x0), log_s - x0
+    spread = float(away @ away)
+    by_scatter = of_student(log_s.size - 2) * math.sqrt(float(rest @ rest) / (log_s.size - 2) / spread)
+    half = max(by_scatter, NORMAL_95 * float(np.linalg.norm(away * static_u_N)) / spread)
     values: Mapping[str, Interval] = {"healing_N_per_decade": _about(slope, half)}
     return Reading(
         part.test.test_id, "healing", holds[0].start_s, holds[-1].end_s, normal_load_N=part.test.normal_load_N,
