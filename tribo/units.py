@@ -53,11 +53,11 @@ QUANTITIES: dict[str, Quantity] = {
             forza di attrito, fuerza, forza, forca, kracht, carga, force x, fx force, daq fx, tensile load, zugkraft,
             charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft, friktion, wrijvingskracht,
             treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta, forca de atrito,
-            forca de friccao, shear force, drag force, drag, sliding force, tan force, tang force, f fric, f drag,
-            f tan, ffric, querkraft, horizontalkraft, gleitkraft, fuerza tangencial, forca tangencial,
-            forza tangenziale, 水平力, 横向力, せん断力, 引張力, tangencialni sila, сила трения, сила, усилие, τριβη,
-            摩擦力, obciazenie, нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 力值, 拉力, 摩擦荷重, 摩擦抵抗, 摩擦抵抗力,
-            動摩擦力, 荷重, 마찰력, 하중, 힘
+            forca de friccao, shear force, drag force, drag, sliding force, tan force, tang force, f fric, fh, f h,
+            fl, f l, f lat, f drag, f tan, ffric, querkraft, horizontalkraft, gleitkraft, fuerza tangencial,
+            forca tangencial, forza tangenziale, 水平力, 横向力, せん断力, 引張力, tangencialni sila, сила трения,
+            сила, усилие, τριβη, 摩擦力, obciazenie, нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 力值, 拉力, 摩擦荷重,
+            摩擦抵抗, 摩擦抵抗力, 動摩擦力, 荷重, 마찰력, 하중, 힘
         """),
         _quantity("displacement", "m", "displacement_m", """
             extension, displacement, stroke, crosshead, crosshead position, position, standard travel, standardweg,
@@ -81,12 +81,12 @@ QUANTITIES: dict[str, Quantity] = {
             normalkraft, f n, f z, normal, contact load, specimen load, applied normal load, applied normal force,
             carico normale, carico, vertical load, down force, force normal, load normal, normalbelastung, normallast,
             anpresskraft, charge normale, effort normal, force normale, fz, fn, fz force, daq fz, nominal load,
-            force z, carga normal, forza normale, fuerza normal, applied load, applied force, pressing force,
-            clamp force, grip force, downforce, preload, auflast, belastung, pruflast, charge appliquee,
-            carga aplicada, carico applicato, sila docisku, docisk, nacisk, 加载力, 押付荷重, 押し付け力,
-            sila normalna, obciazenie normalne, sila nacisku, normaalivoima, normaalkracht, normalova sila,
-            pritlacna sila, normal kuvvet, forta normala, forca normal, нормальная сила, нормальная нагрузка, 法向力,
-            正压力, 法向载荷, 垂直力, 垂直荷重, 法線力, 押付力, 수직하중, 수직력
+            force z, carga normal, forza normale, fuerza normal, f normal, f norm, fv, f v, applied load,
+            applied force, pressing force, clamp force, grip force, downforce, preload, auflast, belastung, pruflast,
+            charge appliquee, carga aplicada, carico applicato, sila docisku, docisk, nacisk, 加载力, 押付荷重,
+            押し付け力, sila normalna, obciazenie normalne, sila nacisku, normaalivoima, normaalkracht,
+            normalova sila, pritlacna sila, normal kuvvet, forta normala, forca normal, нормальная сила,
+            нормальная нагрузка, 法向力, 正压力, 法向载荷, 垂直力, 垂直荷重, 法線力, 押付力, 수직하중, 수직력
         """),
         _quantity("friction coefficient", "", "friction_coefficient", """
             cof, friction coefficient, coefficient of friction, friction coeff, coeff of friction, coef of friction,
@@ -315,7 +315,7 @@ _NUMBER_BELOW = re.compile(r"/\s*([\d.]+\s*[^\W\d_]+)")
 
 
 _LONGEST_NAME = 80  # characters; longer cells are no column names
-_WIDE = str.maketrans("（）［］【】：／，　･・", "()[][]:/, ··")
+_WIDE = str.maketrans("（）［］【】：／，　･・－", "()[][]:/, ··-")
 _BARRED = str.maketrans({"ł": "l", "ø": "o", "đ": "d", "ß": "ss", "æ": "ae", "œ": "oe", "ı": "i"})
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 # what a logger writes before the name of a column: "C_1_Force", "Station 1 Force", "Latest: Force", "Run #2: Force"

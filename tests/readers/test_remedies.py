@@ -101,6 +101,8 @@ FAULTS = [
     Fault("load_is_friction", table("Time [s],COF,Load [N]", TIME, FORCE, 12 * FORCE)),
     Fault("force_may_be_load", table("Time [s],COF,Force [N]", TIME, FORCE, 3 + 0.001 * TIME)),
     Fault("larger_along_y", table("Time [s],Fx [N],Fy [N]", TIME, 0.01 * FORCE * (K > 5), FORCE * (K > 5))),
+    Fault("two_forces", table("Time [s],Kraft 1 [N],Kraft 2 [N]", TIME, FORCE, 3 * FORCE)),
+    Fault("one_of_two_forces", table("Time [s],Load [N],Resistance [N],x [mm]", TIME, 3 * FORCE, FORCE, TIME)),
     Fault("no_radius", table("Time [s],Torque [N mm],Radius [mm]", TIME, FORCE, np.zeros(N))),
     Fault("names_do_not_fit", table("Time [s],Force [N],x,y,z", TIME, FORCE)),
     Fault("several_tables", GOOD + "\n" + GOOD),

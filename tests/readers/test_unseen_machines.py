@@ -296,3 +296,47 @@ def test_the_buffers_of_a_long_acquisition_are_one_record(tmp_path: Path, pause_
     traces = read_blocks(tmp_path / "a.dat")
     assert len(traces) == records
     np.testing.assert_allclose(np.concatenate([trace.force_N for trace in traces]), FRICTION, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["Fh (N),Fv (N)", "Fuerza horizontal (N),Fuerza vertical (N)", "Force horizontale (N),Force verticale (N)",
+     "Forza orizzontale [N],Forza verticale [N]", "Siła pozioma [N],Siła pionowa [N]",
+     "Horizontalkraft [N],Vertikalkraft [N]",
+     "水平力（N）,垂直力（N）", "Fl [N],Fn [N]"],
+)  # fmt: skip
+def test_a_horizontal_and_a_vertical_force_are_friction_and_load_of_one_record(tmp_path: Path, names: str) -> None:
+    trace = read_export(saved(tmp_path, f"t [s],{names}", TIME, FRICTION, np.full(N, 5.0)))
+    np.testing.assert_allclose(trace.force_N, FRICTION, rtol=1e-5)
+    np.testing.assert_allclose(trace.columns["normal_force_N"], 5.0)
+
+
+@pytest.mark.parametrize("names", ["Load cell 1 [N],Load cell 2 [N]", "Sensor A [N],Sensor B [N]"])
+def test_two_forces_that_differ_by_a_number_alone_are_refused_until_it_is_stated_what_they_are(
+    tmp_path: Path, names: str
+) -> None:
+    path = saved(tmp_path, f"t [s],{names}", TIME, FRICTION, np.full(N, 5.0))
+    first, second = names.split(",")
+    assert "are two records, or the friction and the normal force of one" in refusal(path)
+    trace = read_export(path, columns={"friction_force": first, "normal_force": second})
+    np.testing.assert_allclose(trace.columns["normal_force_N"], 5.0)
+    assert len(read_blocks(path, columns={"friction_force": "* [N]"})) == 2
+
+
+@pytest.mark.parametrize(
+    ("other", "read"), [("Resistance (N)", False), ("Peak Load (N)", True), ("Load filtered (N)", True)]
+)
+def test_a_load_beside_a_force_that_nobody_knows_is_not_read_as_friction(
+    tmp_path: Path, other: str, read: bool
+) -> None:
+    path = saved(tmp_path, f"Time (s),Load (N),{other}", TIME, 3.0 * FRICTION, FRICTION)
+    if read:
+        np.testing.assert_allclose(read_export(path).force_N, 3.0 * FRICTION, rtol=1e-5)
+    else:
+        assert "of two forces it is not known which is the friction" in refusal(path)
+
+
+def test_a_second_sensor_of_the_friction_is_a_doubt(tmp_path: Path) -> None:
+    header = "Time (s),Friction force left (N),Friction force right (N),Normal force (N)"
+    path = saved(tmp_path, header, TIME, FRICTION, FRICTION, 5.0 * FRICTION)
+    assert "could also be Friction force right (N)" in inspect_export(path).in_words()

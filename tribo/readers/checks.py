@@ -16,16 +16,11 @@ from numpy.typing import NDArray
 
 from tribo.errors import Problem, ReadError
 from tribo.input_files import LARGEST_NUMBER, SMALLEST_NUMBER
-from tribo.readers.columns import Column, force_follows
+from tribo.readers.columns import FORCES_OF_NO_KIND, Column, force_follows
 from tribo.records import Correction, FloatArray
 from tribo.units import plain_name
 
 NO_TIME = "no_time"
-_FORCES_OF_NO_KIND = {
-    "force", "kraft", "f", "effort", "fuerza", "forza", "forca", "kracht", "sila", "voima", "kuvvet", "forta",
-    "load cell", "axial force", "standard force", "standardkraft", "prufkraft", "force standard", "сила", "усилие",
-    "力", "試験力", "힘",
-}  # fmt: skip
 _PATH_FOR_TIME_M_S = 1e-3  # 1 mm of path counts as 1 s where neither time nor speed is known
 _STROKES = {"stroke", "hub", "course", "corsa", "curso", "amplitude", "行程", "ストローク", "ход"}
 STROKE = "it is the stroke of an oscillation, no displacement"
@@ -152,7 +147,7 @@ def _refuse_a_force_that_may_be_the_load(
         force_may_be_load.
     """
     column = next(c for c in columns if c.quantity == "friction force")
-    if not column.reason.startswith("named") or plain_name(column.label) not in _FORCES_OF_NO_KIND:
+    if not column.reason.startswith("named") or plain_name(column.label) not in FORCES_OF_NO_KIND:
         return
     large = np.abs(mu) > 0.3 * np.abs(mu).max()
     if large.sum() < _FEWEST_ROWS or not np.all(force[large]):

@@ -27,19 +27,28 @@ _MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coeffic
     "load", "last", "applied load", "charge", "carga", "obciążenie", "obciazenie", "нагрузка", "载荷", "负荷", "荷重",
     "하중",
 }  # fmt: skip
+FORCES_OF_NO_KIND = {
+    "force", "kraft", "f", "effort", "fuerza", "forza", "forca", "kracht", "sila", "voima", "kuvvet", "forta",
+    "load cell", "axial force", "standard force", "standardkraft", "prufkraft", "force standard", "сила", "усилие",
+    "力", "試験力", "힘",
+}  # fmt: skip
 _A_RATIO_BESIDE_STRESS = {"friction", "friktion", "frottement", "tarcie", "reibung"}  # without a unit
 _WITHOUT_DIMENSION = ("-", "1")
 _LOAD_AND_PATH = ("normal force", "displacement")  # what a test is about: an unknown unit of theirs is a fault
 _ALONG_THE_AXIS = {"axial force", "axial load", "thrust", "thrust force"}
 _SAYS_FRICTION = re.compile(
     r"friction|friccion|rozamiento|frottement|attrito|atrito|friktion|reib|tarci|wrijving|treni|surtunme|frecare|kitka|"
-    r"tangential|tangentiel|трени|摩擦力|마찰력"
+    r"tangential|tangentiel|horizontal|orizzontal|poziom|трени|摩擦力|水平力|마찰력"
 )
 _SAYS_SLIDING_SPEED = re.compile(r"sliding (?:speed|velocity)|gleitgeschwindigkeit|vitesse de glissement")
 _MEASURED_BEFORE = re.compile(r"^(?:measured|actual|gemessene?[rs]?)\s+", re.I)
 _SAYS_DEPTH = re.compile(r"\bdepth\b|penetration|indentation|eindring|profondeur|profundidad")
-_SAYS_NORMAL = re.compile(r"\bnorma[al]|normalkraft|normallast|нормальн|法向|垂直力|수직")
-_NO_FORCE = re.compile(r"set ?point|\bset\b|target|soll|limit|max|min|\bstd\b|\bsd\b|deviation|error|zero|offset")
+_SAYS_NORMAL = re.compile(
+    r"\bnorma[al]|normalkraft|normallast|vertical|vertikal|pionow|нормальн|法向|垂直力|수직"
+)
+_NO_FORCE = re.compile(
+    r"set ?point|\bset\b|target|soll|limit|max|min|peak|break|\bstd\b|\bsd\b|deviation|error|zero|offset"
+)
 _CLOCK_OF_RATE = re.compile(r"^(?:zeit|time|temps)\b.*rate$")  # "Zeit  1 - Standardmessrate"
 _ONLY_WITH_UNIT = ("radius", "frequency", "normal stress", "shear stress")  # of no use without
 _A_RATIO = re.compile(
@@ -257,6 +266,8 @@ def assign(
         "time": given.correction.sampling_rate_Hz is not None or "displacement" in there,
         "friction force": force_follows(there, given.correction),
     }
+    if not problems and (of_two := _one_of_two_forces(chosen, names, units, filled)):
+        raise ReadError(of_two)
     missing = [q for q in NEEDED if q not in there and not follows[q]]
     if "friction force" in missing and doubts:  # it may follow from a column whose unit is missing or unknown
         faults, doubts = [*faults, *doubts], []
@@ -272,6 +283,27 @@ def assign(
     if problems or faults:
         raise ReadError([*problems, *faults])
     return tuple(columns), tuple(doubts)
+
+
+def _one_of_two_forces(
+    chosen: Chosen, names: Sequence[str], units: Sequence[str], filled: Sequence[bool]
+) -> Problem | None:
+    """The fault of a load or force read as friction beside a force of a name that nobody knows: it may be the load."""
+    index, _, reason = chosen.get("friction force", (-1, None, ""))
+    plain = plain_name(split_unit(names[index])[0]) if index >= 0 else ""
+    of_no_kind = plain in _MEANS_NORMAL_BESIDE_FRICTION or plain in FORCES_OF_NO_KIND
+    if not reason.startswith("named") or not of_no_kind or "normal force" in chosen:
+        return None
+    taken = {k for k, _, _ in chosen.values()}
+    for k, name in enumerate(names):
+        unit, bare = _unit_of(names, units, k), plain_name(split_unit(name)[0])
+        unknown = name and k not in taken and filled[k] and not match_column(name) and not _NO_FORCE.search(bare)
+        if unknown and unit and is_unit(unit, "friction force") and not set(bare.split()) & set(plain.split()):
+            what = f"of two forces it is not known which is the friction: {names[index]} or {name}"
+            of_both = f'friction_force = "{name}", normal_force = "{names[index]}"'
+            allowed = f'{of_both} in columns; or friction_force = "{names[index]}"'
+            return Problem("one_of_two_forces", what, column=names[index], allowed=allowed)
+    return None
 
 
 def force_follows(there: Collection[str], stated: Correction) -> str:

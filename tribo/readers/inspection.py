@@ -20,9 +20,11 @@ from tribo.readers.columns import (
     Given,
     assign,
     bare_unit,
+    by_a_word,
     match_column,
     parse_columns,
     raw_signals,
+    split_unit,
 )
 from tribo.readers.layout import Layout, first_table
 from tribo.readers.reading import (
@@ -330,7 +332,8 @@ def _other_candidates(reading: ReadTable) -> list[Problem]:
             for k in range(layout.n_cells)
             if k not in taken | raw
             and layout.filled[k]
-            and (hit := match_column(layout.names[k]))
+            and layout.names[k]
+            and (hit := match_column(layout.names[k]) or by_a_word(layout.names[k], _unit(layout, k)))
             and hit[0] == column.quantity
         ]
         if others:
@@ -338,6 +341,10 @@ def _other_candidates(reading: ReadTable) -> list[Problem]:
             place = (reading.source.file, layout.names_row, column.label)
             doubts.append(Problem("other_candidate", what, *place))
     return doubts
+
+
+def _unit(layout: Layout, k: int) -> str:
+    return bare_unit(layout.units[k]) or split_unit(layout.names[k])[1] or ""
 
 
 def _table_in_words(table: TableSeen) -> str:

@@ -8,7 +8,16 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.columns import Given, Hint, bare_unit, by_a_word, is_unit, match_column, raw_signals, split_unit
+from tribo.readers.columns import (
+    Given,
+    Hint,
+    bare_unit,
+    by_a_word,
+    is_unit,
+    match_column,
+    raw_signals,
+    split_unit,
+)
 from tribo.readers.layout import Layout, cut
 from tribo.readers.source import Source
 from tribo.units import QUANTITIES
@@ -97,13 +106,25 @@ def _records(layout: Layout, given: Given) -> Sequence[Record]:
             if {"time", "friction force"} <= {meant[k] for k in groups[0]}:
                 return [record(group) for group in groups]
         return ()
+    of_unit = all(_is_a_force_by_unit(layout, k) for k in rest)
+    if len(rest) == 2 and (of_unit or (stems[rest[0]] == stems[rest[1]] and meant[rest[0]] == "friction force")):
+        if any(hint.quantity in ("friction force", "normal force") for hint in given.hints):
+            return ()
+        raise ReadError(_two_forces(names[rest[0]], names[rest[1]]))
     for groups in _repeats(rest, [stems[k] for k in rest], 1):
         if [meant[k] for k in groups[0]].count("friction force") == 1:
             return [record(group, times) for group in groups]
-    if all(_is_a_force_by_unit(layout, k) for k in rest):
+    if of_unit:
         by_unit = [Hint("friction force", "#2", f'"{names[k]}", by its unit') for k in rest]
         return [(names[k], (*times, k), (k,), (hint,)) for k, hint in zip(rest, by_unit, strict=True)]
     return ()
+
+
+def _two_forces(first: str, second: str) -> Problem:
+    """The fault of two forces under one time: two records, or the friction and the normal force of one."""
+    what = f"{first} and {second} are two records, or the friction and the normal force of one"
+    of_one = f'friction_force = "{first}", normal_force = "{second}" in columns'
+    return Problem("two_forces", what, allowed=f'{of_one}; or, of two records, friction_force = "* [N]"')
 
 
 def _repeats(columns: Sequence[int], names: Sequence[str], fewest: int) -> Iterator[list[tuple[int, ...]]]:
