@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from scipy.stats import norm
 
 from tribo.campaign import load_campaign
 from tribo.cli import main
 from tribo.design import rounds
 from tribo.design.answer import REACHES, Answer, Learnt, Lesson, Prediction, measured_of, model_errors
 from tribo.design.answer_files import campaign_of
-from tribo.design.rounds import Aim, improbability
+from tribo.design.rounds import Aim, cost_once_measured
 from tribo.design.target import Family, Space, Target, Want
 from tribo.stages import study
 
@@ -83,13 +82,11 @@ def test_a_model_error_below_what_was_measured_is_widened_to_it():
     assert found.missed(0, [FIRST])[STATIC][0][0] == pytest.approx(math.log(0.75), rel=0.05)
 
 
-@pytest.mark.parametrize("value", [4.0, 4.9, 6.5])
-def test_the_cost_after_a_measurement_is_the_chance_to_miss_the_target(value: float):
-    """-ln of the probability between the ends of the tolerance, on both sides of it."""
-    logs, sds = {STATIC: np.array([math.log(value)])}, {STATIC: np.array([0.1])}
-    ends = np.array([math.log(5.0) + s * math.log(1.05) for s in (-1, 1)])
-    chance = np.diff(norm.cdf((ends - math.log(value)) / 0.1))
-    assert improbability(TARGET, logs, sds) == pytest.approx(-np.log(chance))
+def test_once_something_was_measured_doubt_decides_among_designs_that_are_predicted_to_meet():
+    """Within a quarter of the tolerance of 5 %; half of it off counts more than any doubt."""
+    logs, sds = {STATIC: np.log([5.0, 5.05, 5.12])}, {STATIC: np.array([0.2, 0.1, 0.01])}
+    sure, unsure, off = (1, 0, 2)
+    assert list(np.argsort(cost_once_measured(TARGET, logs, sds))) == [sure, unsure, off]
 
 
 def test_of_designs_that_are_predicted_alike_the_one_near_the_measured_is_chosen():
