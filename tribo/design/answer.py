@@ -296,8 +296,8 @@ def lessons_of(measured: Sequence[Measured], all_rounds: Rounds, base: SimConfig
 # A correction has a part that all patterns share, and one that is alike for neighbours of a family. The share of the
 # first and the reach of the second, in ln of the lengths and in the area fraction, lie between those of the patterns of
 # the paper (0.3 and 0.5, the most likely at 10 kPa) and those of changes of the open parameters of the model (up to 0.9
-# and 2.9 in `benchmarks/design_exam.py reach`, with room above). Every pair is weighed by its likelihood for the patterns
-# of the paper and for those that were measured.
+# and 2.9 in `benchmarks/design_exam.py reach`, with room above). Every pair is weighed by its likelihood for the
+# patterns of the paper and for those that were measured.
 SHARES = np.linspace(0.3, 0.9, 7)
 REACHES = np.geomspace(0.5, 4.0, 7)
 LEAST_NOISE = 1e-3  # of ln(T/N), so that equal patterns can be solved for
