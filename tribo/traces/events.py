@@ -34,8 +34,8 @@ _NEXT_TRY, _MOST_TRIES = 1.3, 8
 _IMPULSE = 6.0  # times the noise by which an impulse stands out
 _FAR = 7.0  # times the median distance from the median beyond which a slope is left out
 _FEWEST_SLIPS = 2
-_STEADILY = 0.7  # share of the loadings that regain steadily what was lost,
-_BY_CHANCE = 0.02  # and so many of them that noise has more with this probability at the most
+_BY_CHANCE = 0.02  # probability at the most by which noise has as many loadings that regain steadily what was lost
+_MANY, _REGULAR = 20, 0.25  # falls whose recurrence varies less; in noise alone 0.37 at the least (docs/results/events.md)
 _VERY_CLEAR = 15.0  # times the noise that each of a few slips loses
 _UNTOLD = 0.01  # share of a cycle above which a data point is too long to tell where an unresolved fall begins
 _FEWEST_SAMPLES = 8
@@ -192,7 +192,8 @@ def _are_slips(found: Sequence[Slip], noise: float) -> bool:
     """Whether falls of a sliding force are slips and not its noise.
 
     Between slips the loading regains at one pace what was lost: its middle part tells of the whole. The highest and
-    lowest values of correlated noise rise by half or double of what their middle tells about as often as not.
+    lowest values of correlated noise rise by half or double of what their middle tells about as often as not. Many falls
+    at a regular pace are slips as well: noise has none.
     """
     if len(found) < _FEWEST_SLIPS:
         return False
@@ -200,9 +201,11 @@ def _are_slips(found: Sequence[Slip], noise: float) -> bool:
     told = np.array([b.loading_N_per_s * (b.fail_s - a.end_s) for a, b in pairwise(found)]) / regained
     steadily, count = int(np.count_nonzero((told > 0.5) & (told < 2.0))), told.size
     by_chance = sum(math.comb(count, k) for k in range(steadily, count + 1)) / 2**count
-    if by_chance > _BY_CHANCE:  # too few to tell by their shape
-        return steadily == count and min(s.drop_N for s in found) > _VERY_CLEAR * noise
-    return steadily >= _STEADILY * count
+    recurrence = np.diff([s.fail_s for s in found])
+    regular = count >= _MANY and recurrence.std() < _REGULAR * recurrence.mean()
+    if by_chance <= _BY_CHANCE or regular:
+        return True
+    return steadily == count and min(s.drop_N for s in found) > _VERY_CLEAR * noise
 
 
 def _spans(time: FloatArray, force: FloatArray, peaks: np.ndarray, drive_N_per_s: float) -> list[Span]:
