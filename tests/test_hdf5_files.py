@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tribo import files as hdf5_files
-from tribo.files import HeldBackErrors, whole_hdf5
+from tribo.files import HeldBackErrors, intact_hdf5, whole_hdf5
 
 
 class _Full(io.FileIO):
@@ -57,3 +57,22 @@ def test_an_error_of_the_writer_itself_is_not_held_back(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), whole_hdf5(tmp_path / "a.h5"):
         _ = 1 / 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flipped_bit_is_noticed_before_the_library_opens_the_file(tmp_path: Path) -> None:
+    """The library may search for ever in a damaged heap."""
+    write(tmp_path / "a.h5")
+    intact, rng = (tmp_path / "a.h5").read_bytes(), np.random.default_rng(6)
+    assert intact_hdf5(tmp_path / "a.h5") == tmp_path / "a.h5"
+    for place in rng.choice(len(intact) - 200, 40, replace=False):
+        damaged = bytearray(intact)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        (tmp_path / "b.h5").write_bytes(damaged)
+        with pytest.raises(OSError, match=r"b\.h5: the file differs from its checksum"):
+            intact_hdf5(tmp_path / "b.h5")
+
+
+def test_a_file_that_another_program_wrote_has_no_checksum_and_is_opened(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["numbers"] = np.arange(10.0)
+    assert intact_hdf5(tmp_path / "a.h5") == tmp_path / "a.h5"

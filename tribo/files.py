@@ -7,13 +7,16 @@ file; the package uses the functions of this module in their place.
 A file is written under a temporary name, then renamed, and so whole or absent. The same holds for HDF5 files. Their
 library can neither close nor abandon a file that it failed to write to: what it does then ranges from a second error to
 the end of the process. It therefore writes to a file object that keeps the first error of the operating system to
-itself until the library has closed the file.
+itself until the library has closed the file. One flipped bit can make the library search for ever: a checksum of all
+bytes stands behind what it wrote, where it looks at nothing, and is compared before it opens the file.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from fnmatch import fnmatchcase
@@ -187,9 +190,19 @@ class HeldBackErrors(io.RawIOBase):
         return True
 
 
+class DamagedFileError(OSError):
+    """The bytes of a file are not those that were written."""
+
+
+_CHECKSUM = b"\nsha256 of all bytes before this line: %s\n"
+_STATED = re.compile(re.escape(_CHECKSUM).replace(b"%s", b"([0-9a-f]{64})"))
+_CHUNK = 1 << 20
+
+
 @contextmanager
 def whole_hdf5(path: Path) -> Iterator[HeldBackErrors]:
-    """Yield a file object for h5py or h5netcdf to write to; on success the file is renamed to ``path``.
+    """Yield a file object for h5py or h5netcdf to write to; on success the file gets a checksum and is renamed to
+    ``path``.
 
     Raises
     ------
@@ -203,8 +216,37 @@ def whole_hdf5(path: Path) -> Iterator[HeldBackErrors]:
         except Exception:
             if held.failure is None:
                 raise
+        if held.failure is None:
+            raw.seek(0)
+            checksum = hashlib.file_digest(raw, "sha256").hexdigest()
+            held.seek(0, io.SEEK_END)
+            held.write(_CHECKSUM % checksum.encode())
         if held.failure is not None:
             raise held.failure
+
+
+def intact_hdf5(path: str | Path) -> Path:
+    """The path of an HDF5 file, to be opened by its library.
+
+    Raises
+    ------
+    OSError
+        With the path: the file cannot be read.
+    DamagedFileError
+        Its bytes are not those that :func:`whole_hdf5` wrote. A file with no checksum behind it is not compared.
+    """
+    path, digest = Path(path), hashlib.sha256()
+    with naming(path), path.open("rb") as file:
+        left = file.seek(0, io.SEEK_END) - len(_CHECKSUM % bytes(64))
+        file.seek(max(left, 0))
+        stated = _STATED.fullmatch(file.read())
+        file.seek(0)
+        while stated is not None and left > 0 and (part := file.read(min(left, _CHUNK))):
+            digest.update(part)
+            left -= len(part)
+    if stated is not None and digest.hexdigest().encode() != stated[1]:
+        raise DamagedFileError(f"{path}: the file differs from its checksum")
+    return path
 
 
 _PACKAGE = Path(__file__).resolve().parent

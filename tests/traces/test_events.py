@@ -42,7 +42,8 @@ def test_slips_are_found_in_the_noise_of_real_rigs(seed: int) -> None:
 @pytest.mark.parametrize("seed", [21, 23, 29])
 def test_regular_slips_are_found_where_noise_hides_the_pace_of_a_third_of_their_loadings(seed: int) -> None:
     rig = Slider(stiffness_N_per_m=300.0, speed_m_s=5e-5, mass_kg=0.2, sliding_N=0.36, excess_N=0.047, scatter=0.15,
-                 creep_m=0.0, rate_Hz=8.0, duration_s=350.0, noise=0.037, correlation=0.8, impulse=0.06, impulses=0.01)  # fmt: skip
+                 creep_m=0.0, rate_Hz=8.0, duration_s=350.0, noise=0.037, correlation=0.8, impulse=0.06,
+                 impulses=0.01)  # fmt: skip
     time, force, truth = record(rig, seed)
     found = np.array([s.fail_s for s in slips_of(time, force, speed_m_s=rig.speed_m_s)])
     assert scores(found, truth["fail_s"])[0] >= 0.97

@@ -19,7 +19,7 @@ from urllib.parse import quote
 import numpy as np
 
 from tribo.errors import CampaignError, FitError, Problem, SimulationError, failed_by_system, naming
-from tribo.files import found_in
+from tribo.files import found_in, intact_hdf5
 from tribo.kept_results import (
     FOREIGN,
     DamagedResultWarning,
@@ -171,7 +171,7 @@ def kept_faults(kept: Path) -> dict[str, str]:
     found = {path.name: fault_of_kept(path) for path in found_in(kept, "*.json")}
     for path in found_in(kept, f"*{SUFFIX}"):
         try:
-            with h5py.File(path) as file:
+            with h5py.File(intact_hdf5(path)) as file:
                 checksum, signed = checksum_of(file), str(file.attrs.get("signed", ""))
                 damaged = checksum != str(file.attrs.get("checksum", ""))
         except UNREADABLE as why:
@@ -191,7 +191,7 @@ def _cell_of(path: Path, table: pd.DataFrame, patterns: Mapping[str, Pattern]) -
     sample = str(table["sample"].iloc[0])
     if sample not in patterns:
         return None
-    with h5py.File(path) as file:
+    with h5py.File(intact_hdf5(path)) as file:
         friction = LocalFriction(**{f.name: float(file.attrs[f"friction_{f.name}"]) for f in fields(LocalFriction)})
     configs = tuple(
         SimConfig(

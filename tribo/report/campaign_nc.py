@@ -17,7 +17,7 @@ import pandas as pd
 
 from tribo import outputs
 from tribo.errors import failed_by_system
-from tribo.files import whole_hdf5
+from tribo.files import intact_hdf5, whole_hdf5
 from tribo.outputs import unit_of
 from tribo.records import Study, Trace
 from tribo.report.provenance import Provenance
@@ -130,7 +130,7 @@ def _earlier(path: Path) -> dict[str, Group]:
     import h5netcdf
 
     try:
-        with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
+        with h5netcdf.File(intact_hdf5(path), "r", decode_vlen_strings=True) as file:
             return {f"/{name}": _read(place) for name, place in file.groups.items()}
     except (OSError, ValueError, KeyError, RuntimeError) as why:  # h5py on damaged files
         if failed_by_system(why):

@@ -21,7 +21,7 @@ import pandas as pd
 
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem, failed_by_system
-from tribo.files import bytes_of, text_of
+from tribo.files import bytes_of, intact_hdf5, text_of
 from tribo.outputs import product
 from tribo.report.provenance import Provenance, write_results
 from tribo.wording.numerals import significant, true_minus
@@ -76,7 +76,7 @@ def read_reported(folder: Path) -> Reported:
 
     try:
         fits, tests = (pd.read_csv(StringIO(text_of(folder / name)), dtype={"sample": str}) for name in READ)
-        with h5py.File(folder / "campaign.nc") as file:
+        with h5py.File(intact_hdf5(folder / "campaign.nc")) as file:
             title, area = str(file.attrs["title"]), float(np.ravel(file.attrs["nominal_area_m2"])[0])
         loads = pd.to_numeric(tests["normal_load_N"], errors="coerce")
         card, verdict = (_json(folder / name) for name in ("card.json", "verdict.json"))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tribo.errors import failed_by_system, naming
-from tribo.files import found_below, found_in, text_of, write_text
+from tribo.files import found_below, found_in, intact_hdf5, text_of, write_text
 from tribo.site.steps import OF_A_REPORT, id_of, read_record
 from tribo.user_text import for_spreadsheet, from_spreadsheet
 
@@ -132,7 +132,7 @@ def _title(out: Path) -> str:
     import h5py
 
     try:
-        with h5py.File(out / "campaign.nc") as file:
+        with h5py.File(intact_hdf5(out / "campaign.nc")) as file:
             return str(file.attrs.get("title", ""))
     except (OSError, RuntimeError, KeyError, ValueError) as why:  # h5py on damaged files
         if failed_by_system(why):

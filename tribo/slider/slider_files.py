@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, SimulationError, system_problem
+from tribo.files import intact_hdf5
 from tribo.input_files import (
     DEEPEST_NESTING,
     LARGEST_DESCRIPTION_BYTES,
@@ -236,7 +237,7 @@ def slider_file_kind(path: Path) -> str:
     import h5py
 
     try:
-        with h5py.File(path) as file:
+        with h5py.File(intact_hdf5(path)) as file:
             title = str(file.attrs.get("title", ""))
     except (OSError, ValueError, KeyError):
         return ""

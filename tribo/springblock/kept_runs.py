@@ -21,7 +21,7 @@ import numpy as np
 from tribo import outputs
 from tribo.display import exact_text
 from tribo.errors import Problem, SimulationError, failed_by_system
-from tribo.files import whole_hdf5
+from tribo.files import DamagedFileError, intact_hdf5, whole_hdf5
 from tribo.kept_results import FOREIGN, DamagedResultWarning, signature, sources
 from tribo.own_folder import only_writer_of
 from tribo.records import Run
@@ -148,7 +148,7 @@ def kind_of(path: Path) -> str:
     import h5py
 
     try:
-        with h5py.File(path) as file:
+        with h5py.File(intact_hdf5(path)) as file:
             title = str(file.attrs.get("title", ""))
     except (OSError, ValueError, KeyError) as why:
         if failed_by_system(why):
@@ -280,10 +280,12 @@ def read_stored(path: str | Path) -> pd.DataFrame:
 
     path = Path(path)
     try:
-        with h5py.File(path) as file:
+        with h5py.File(intact_hdf5(path)) as file:
             intact = file.attrs["checksum"] == checksum_of(file)
             columns = {str(name): file[name][:] for name in file.attrs["columns"]}
         texts = {name: np.array([t.decode() for t in c], object) for name, c in columns.items() if c.dtype == object}
+    except DamagedFileError:
+        intact = False
     except UNREADABLE as why:
         raise SimulationError(_no_store(path, why)) from why
     if not intact:
@@ -302,10 +304,12 @@ def fault_of(design: Sequence[SimConfig], path: Path, work: Work = FRICTION) -> 
 
     place, allowed = str(path), "a new file, or --force to replace this one"
     try:
-        with h5py.File(path) as file:
+        with h5py.File(intact_hdf5(path)) as file:
             made_from = file.attrs["design"], file.attrs["sources"]
             checksum, signed = (str(file.attrs.get(name, "")) for name in ("checksum", "signed"))
             intact = checksum == checksum_of(file)
+    except DamagedFileError:
+        return Problem("damaged_store", "it differs from its checksum", file=place)
     except UNREADABLE as why:
         return _no_store(path, why)
     if made_from[0] != fingerprint(design, work):

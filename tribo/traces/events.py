@@ -35,7 +35,7 @@ _IMPULSE = 6.0  # times the noise by which an impulse stands out
 _FAR = 7.0  # times the median distance from the median beyond which a slope is left out
 _FEWEST_SLIPS = 2
 _BY_CHANCE = 0.02  # probability at the most by which noise has as many loadings that regain steadily what was lost
-_MANY, _REGULAR = 20, 0.25  # falls whose recurrence varies less; in noise alone 0.37 at the least (docs/results/events.md)
+_MANY, _REGULAR = 20, 0.25  # falls whose recurrence varies less than in noise alone (docs/results/events.md)
 _VERY_CLEAR = 15.0  # times the noise that each of a few slips loses
 _UNTOLD = 0.01  # share of a cycle above which a data point is too long to tell where an unresolved fall begins
 _FEWEST_SAMPLES = 8
@@ -192,8 +192,8 @@ def _are_slips(found: Sequence[Slip], noise: float) -> bool:
     """Whether falls of a sliding force are slips and not its noise.
 
     Between slips the loading regains at one pace what was lost: its middle part tells of the whole. The highest and
-    lowest values of correlated noise rise by half or double of what their middle tells about as often as not. Many falls
-    at a regular pace are slips as well: noise has none.
+    lowest values of correlated noise rise by half or double of what their middle tells about as often as not. Many
+    falls at a regular pace are slips as well: noise has none.
     """
     if len(found) < _FEWEST_SLIPS:
         return False
