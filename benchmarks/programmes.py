@@ -1,7 +1,7 @@
 """Programmes of a virtual tribometer: every kind on many seeds, and records that drift, beside what was read.
 
     python benchmarks/programmes.py --seeds 50 --first 5000 --jobs 2 > programmes.json
-    python benchmarks/programmes.py --seeds 2 --first 5000 --sweep > programmes-constants.csv
+    python benchmarks/programmes.py --seeds 4 --first 2000 --sweep --kinds "force only" > programmes-constants.csv
 
 ``--sweep`` halves and doubles every constant of the phases and counts the boundaries that are missed, and found where
 none is.
@@ -51,10 +51,10 @@ def drifting(seeds: range) -> Counter[str]:
     return states
 
 
-def swept(seeds: range) -> Iterator[tuple[str, float, float, int, int]]:
+def swept(kinds: list[str], seeds: range) -> Iterator[tuple[str, float, float, int, int]]:
     """Name and value of every constant of the phases, the factor on it, and boundaries missed and extra."""
     with tempfile.TemporaryDirectory() as folder:
-        records = [(kind, seed, KINDS[kind](np.random.default_rng([seed, 7]))) for kind in KINDS for seed in seeds]
+        records = [(kind, seed, KINDS[kind](np.random.default_rng([seed, 7]))) for kind in kinds for seed in seeds]
         written([record for *_, record in records], Path(folder) / "campaign")
         traces = []
         for k, (kind, seed, record) in enumerate(records):
@@ -92,11 +92,12 @@ if __name__ == "__main__":
     options.add_argument("--first", type=int, default=5000)
     options.add_argument("--jobs", type=int, default=1)
     options.add_argument("--sweep", action="store_true")
+    options.add_argument("--kinds", default="", help="of the sweep: those whose names hold this")
     given = options.parse_args()
     seeds = range(given.first, given.first + given.seeds)
     if given.sweep:
         print("constant,value,factor,missed,extra")
-        for row in swept(seeds):
+        for row in swept([kind for kind in KINDS if given.kinds in kind], seeds):
             print(*row, sep=",", flush=True)
         sys.exit()
     with get_context("spawn").Pool(given.jobs) as pool:

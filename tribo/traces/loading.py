@@ -221,7 +221,7 @@ def _roughness(force: FloatArray, rise: Rise, depart: int, peak_N: float) -> tup
     onset, rises = max(rise.first - (rise.last - rise.first), 0), sample_noise(rising)
     at_rest = sample_noise(force[:onset]) if onset >= _FEWEST_OF_RISE else rises
     if rises > _ROUGHER * at_rest:
-        rises = math.hypot(at_rest, math.sqrt(rises**2 - at_rest**2) * peak_N / float(rising.mean()))
+        rises = math.hypot(at_rest, math.sqrt(max(rises**2 - at_rest**2, 0.0)) * peak_N / float(rising.mean()))
     elif not kept:
         return 0.0, 1.0  # noise as the fit of a peak counts it
     return rises * math.sqrt(3.0 / (3.0 - 4.0 * kept + kept**2)), (1.0 + kept) / (1.0 - kept)
