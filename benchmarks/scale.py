@@ -1,6 +1,7 @@
 """Time and memory of `tribo diagnose` and `tribo report` against the number of tests of a campaign.
 
     python benchmarks/scale.py run OUT [--tests 324 1000 3000 10000] [--grows repeats specimens] [--command diagnose]
+                                        [--columns 300]
     python benchmarks/scale.py table OUT
 
 Campaigns are those of tests/blind: six samples, six loads, 700 data points a pull, with an effect of humidity for the
@@ -29,6 +30,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import numpy as np
+import pandas as pd
 import psutil
 from blind.tribometer import Design, hide, write
 
@@ -48,12 +50,19 @@ def design_of(tests: int, grows: str) -> Design:
     return replace(base, missing=1.0 - tests / made)
 
 
-def campaign(out: Path, tests: int, grows: str) -> Path:
-    """The campaign on disk, made once."""
-    folder = out / f"{grows}-{tests}"
+def campaign(out: Path, tests: int, grows: str, columns: int) -> Path:
+    """The campaign on disk, made once; further ``columns`` are noise, few values, names and walks in turn."""
+    folder = out / f"{grows}-{tests}-{columns}"
     if not (folder / "tests.csv").exists():
         shutil.rmtree(folder, ignore_errors=True)
         write(hide(SEED, [EFFECT], design_of(tests, grows)), folder, SEED)
+        table, rng = pd.read_csv(folder / "tests.csv", dtype=str), np.random.default_rng(SEED)
+        kinds = (
+            lambda n: rng.normal(10.0, 2.0, n).round(2), lambda n: rng.integers(1, 5, n),
+            lambda n: rng.choice(["a", "b", "c"], n), lambda n: rng.normal(size=n).cumsum().round(2),
+        )  # fmt: skip
+        further = pd.DataFrame({f"extra_{k}": kinds[k % len(kinds)](len(table)) for k in range(columns)})
+        pd.concat([table, further], axis=1).to_csv(folder / "tests.csv", index=False)
     return folder
 
 
@@ -110,14 +119,16 @@ def measured(command: str, folder: Path, out: Path, seconds: float) -> dict[str,
     return record | {"page_MB": {p.name: round(p.stat().st_size / 1e6, 2) for p in pages}}
 
 
-def run(out: Path, sizes: Iterable[int], grows: Iterable[str], commands: Iterable[str], seconds: float) -> None:
+def run(
+    out: Path, sizes: Iterable[int], grows: Iterable[str], commands: Iterable[str], columns: int, seconds: float
+) -> None:
     out.mkdir(parents=True, exist_ok=True)
     for way in grows:
         for tests in sizes:
-            folder = campaign(out, tests, way)
+            folder = campaign(out, tests, way, columns)
             for command in commands:
                 found = measured(command, folder, out / f"{way}-{tests}-{command}", seconds)
-                line = json.dumps({"command": command, "grows": way, "tests": tests} | found)
+                line = json.dumps({"command": command, "grows": way, "tests": tests, "columns": columns} | found)
                 print(line, flush=True)
                 with (out / "scale.jsonl").open("a", encoding="utf-8") as lines:
                     lines.write(line + "\n")
@@ -158,10 +169,11 @@ def main() -> int:
     parser.add_argument("--tests", type=int, nargs="+", default=TESTS)
     parser.add_argument("--grows", nargs="+", choices=GROWS, default=GROWS)
     parser.add_argument("--command", nargs="+", choices=COMMANDS, default=COMMANDS)
+    parser.add_argument("--columns", type=int, default=0, help="further columns of tests.csv")
     parser.add_argument("--seconds", type=float, default=1800.0, help="after which a command is ended")
     given = parser.parse_args()
     if given.what == "run":
-        run(given.out, given.tests, given.grows, given.command, given.seconds)
+        run(given.out, given.tests, given.grows, given.command, given.columns, given.seconds)
     else:
         print(table(given.out))
     return 0

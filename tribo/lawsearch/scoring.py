@@ -164,10 +164,17 @@ class Projection:
     def gains(self, courses: Courses, acts: Acts) -> FloatArray:
         """Log likelihood gained by each course in each scope at its best amplitude, (r, scopes, k); the second
         amplitude of a wave costs one unit."""
-        own, pull = self.products(courses.first, acts)
-        found = 0.5 * pull**2 / own
+        scopes, k = len(acts[0][1]), courses.first.shape[1]
+        found = np.empty((self.left.shape[1], scopes, k))
+        of_two = []
+        for start in range(0, k, COLUMNS_AT_ONCE):  # hundreds of columns have a hundred million laws
+            end = start + COLUMNS_AT_ONCE
+            own, pull = self.products(courses.first[:, start:end], acts)
+            found[:, :, start:end] = 0.5 * pull**2 / own
+            two = courses.two[(courses.two >= start) & (courses.two < end)] - start
+            of_two.append((own[:, two], pull[:, :, two]))
         if len(courses.two):
-            own1, pull1 = own[:, courses.two], pull[:, :, courses.two]
+            own1, pull1 = (np.concatenate(each, axis=-1) for each in zip(*of_two, strict=True))
             own2, pull2 = self.products(courses.second, acts)
             both, _ = self.products(courses.first[:, courses.two] + courses.second, acts)
             with np.errstate(invalid="ignore"):
@@ -268,7 +275,9 @@ class Grammar:
 
     def net(self, projected: Projection) -> FloatArray:
         """What each law gains less its cost, (r, laws)."""
-        found = projected.gains(self.courses, self.acts) - self.courses.cost - self.scope_cost[:, None]
+        found = projected.gains(self.courses, self.acts)
+        found -= self.courses.cost
+        found -= self.scope_cost[:, None]
         found[:, corrects_a_pattern(self.scopes, self.courses.shapes)] = -np.inf
         return found.reshape(len(found), -1)
 
