@@ -81,7 +81,8 @@ def _held(path: Path, until: float, busy: Problem, *, lasting: bool = False, nam
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            lock.acquire()
+            with naming(path):
+                lock.acquire()
             break
         except FileNotFoundError:  # its last holder removed the folder in between
             continue

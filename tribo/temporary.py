@@ -17,6 +17,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from tribo.errors import naming
+
 PREFIX = "tribo-files-"
 IN_USE = "in-use"  # locked for as long as the folder is in use; the system unlocks it when a process ends, however
 FILES = "files"
@@ -51,7 +53,8 @@ def temporary_folder_of_child(prefix: str = PREFIX) -> Iterator[tuple[Path, int]
         holder = Path(tempfile.mkdtemp(prefix=prefix))
         lock = FileLock(holder / IN_USE, mode=0o600, thread_local=False, on_acquired=descriptors.append)
         try:
-            lock.acquire()
+            with naming(holder):
+                lock.acquire()
         except FileNotFoundError:  # another start took it for an abandoned one
             continue
         except BaseException:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tribo.errors import CampaignError
-from tribo.own_folder import RECORD, BusyError, own_folder, recorded_outputs
+from tribo.own_folder import RECORD, BusyError, only_writer_of, own_folder, recorded_outputs
 
 HOLDER = """
 import sys, time
@@ -136,3 +136,13 @@ def test_a_folder_with_nothing_but_kept_results_is_known(tmp_path: Path) -> None
     (tmp_path / "kept" / "letter.txt").touch()
     with pytest.raises(CampaignError, match="kept"), own_folder(tmp_path):
         pass
+
+
+def test_an_error_of_the_system_at_a_lock_names_the_lock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fchmod", full)
+    with pytest.raises(OSError, match="No space left") as found, only_writer_of(tmp_path / "runs.nc"):
+        pass
+    assert found.value.filename == str(tmp_path / ".runs.nc.lock")

@@ -20,6 +20,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from filelock import BaseFileLock
+
 from faults.file_operations import Fault, Operation, real_os_open
 from faults.trial import SLOW_S, Bench, Orders, Outcome, be_child
 
@@ -85,8 +87,10 @@ def _open_below(root: Path) -> dict[int, str]:
 
 def _fork_with_locks() -> int:
     """A fork that keeps the locks of tribo, as the same command would: it passes by the hooks of Python, by which the
-    workers of a command let them go."""
-    return int(_LIBC.fork())
+    workers of a command let them go. The branch is the same command: it does not count as another process to a lock."""
+    if not (child := int(_LIBC.fork())):
+        BaseFileLock._raise_if_inherited = lambda _: None  # type: ignore[method-assign]
+    return child
 
 
 def _reopen(below: dict[int, str]) -> None:
