@@ -110,9 +110,10 @@ def _quiet(place: Place) -> Iterator[io.StringIO]:
 
 def build_in_one_process(steps: RememberedSteps, arguments: Sequence[str]) -> int:
     """tribo build with the steps of its workflow run one after another in this process, in place of Snakemake."""
+    from tribo.cli import workflow_step
     from tribo.site import build, steps as of_site
 
-    of_site.apart = lambda function, limits: function()  # type: ignore[assignment]
+    of_site.apart = workflow_step.apart = lambda function, limits: function()  # type: ignore[assignment]
     build._snakemake = partial(_steps_in_order, steps)  # type: ignore[assignment]
     return run_command(arguments)
 

@@ -122,6 +122,7 @@ class RememberedFigures(Remembered):
 
 OF_STEPS = ("out/current", "out/.tribo", "out/campaign.toml")  # what a step reads and writes of a site
 NOT_OF_STEPS = ("out/.tribo/lock", "out/.tribo/log")
+JOURNAL = ("out/.tribo/log", "out/.tribo/log/steps.jsonl")  # a step adds a line, and none reads it
 FOLDER = "folder"
 
 
@@ -224,6 +225,8 @@ class RememberedSteps:
 def _is_of_steps(operation: Operation) -> bool:
     """Whether an operation leaves aside all that is not part of the state: other files of a site."""
     path = operation.path
+    if path in JOURNAL:
+        return True
     if path.startswith(NOT_OF_STEPS):
         return False
     looked_at = operation.kind == "stat" and "out".startswith(path)

@@ -311,6 +311,8 @@ def fault_of(design: Sequence[SimConfig], path: Path, work: Work = FRICTION) -> 
     except DamagedFileError:
         return Problem("damaged_store", "it differs from its checksum", file=place)
     except UNREADABLE as why:
+        if failed_by_system(why) and path.is_file():  # the runs may be whole
+            raise
         return _no_store(path, why)
     if made_from[0] != fingerprint(design, work):
         return Problem("other_design", "it holds runs of a different design", file=place, allowed=allowed)
