@@ -446,9 +446,8 @@ def correction_text(learnt: Learnt, best: Tried) -> list[str]:
 def answered(rank: int, t: Tried, surrogates: Surrogates, aim: Aim, mesh: dict[Response, float]) -> Answer:
     """The prediction of one design for everything that is wanted."""
     target, space = aim.target, aim.spaces[t.space]
-    missed = aim.missed(t.space, [t.lengths_um])
-    logs = {r: v + float(missed[r][0][0]) for r, v in t.logs.items()}
-    sds = {r: sd for r, (_, sd) in missed.items()}
+    logs = aim.corrected_design(t)
+    sds = {r: sd for r, (_, sd) in aim.missed(t.space, [t.lengths_um]).items()}
     own = surrogates.get(t.space)
     slopes = {want.text(): slopes_of(want, aim, t, own) for want in target.target}
     predictions = []
@@ -503,11 +502,7 @@ def goal_text(want: Want, target: Target) -> str:
 def refused(known: Sequence[Tried], aim: Aim, nearest: Answer) -> list[str]:
     """Why no design meets the target: what was reached at most, the nearest, and the limits it lies at."""
     said = []
-    corrected = [
-        {r: v + float(missed[r][0][0]) for r, v in t.logs.items()}
-        for t in known
-        for missed in [aim.missed(t.space, [t.lengths_um])]
-    ]
+    corrected = [aim.corrected_design(t) for t in known]
     for want, p in zip(aim.target.target, nearest.predictions, strict=True):
         values = np.exp([float(reached(want, aim.target, logs)) for logs in corrected])
         if not p.met:

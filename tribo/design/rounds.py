@@ -230,8 +230,13 @@ class Aim:
         corrected, sds = self.corrected(number, lengths, logs)
         return cost_once_measured(self.target, corrected, sds) if self.measured else cost(self.target, corrected)
 
+    def corrected_design(self, t: Tried) -> dict[Response, float]:
+        """ln(T/N) of one design that was run, with what the model misses added."""
+        missed = self.missed(t.space, [t.lengths_um])
+        return {r: v + float(missed[r][0][0]) for r, v in t.logs.items()}
+
     def cost_of(self, t: Tried) -> float:
-        """The same of one design that was run."""
+        """What a search makes small, of one design that was run."""
         return float(self.costs(t.space, [t.lengths_um], {r: np.array([v]) for r, v in t.logs.items()})[0])
 
 
