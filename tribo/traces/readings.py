@@ -6,7 +6,7 @@ Noise and drift of a level are told apart by its cosine coefficients, as in :fun
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
@@ -465,25 +465,14 @@ def _holds(part: Part) -> list[Reading]:
         about = {"normal_load_N": load, "hold_s": restart.hold_s, "values": values}
         found.append(Reading(part.test.test_id, "hold", restart.stop_s, restart.peak_s, **about))  # type: ignore[arg-type]
         if math.isfinite(restart.static_N + pull.sliding_N) and restart.hold_s > 0:
-            gained.append((math.log10(restart.hold_s), restart.static_N - pull.sliding_N, restart.static_u_N))
-    x, y, u = np.array(gained).reshape(-1, 3).T
-    if x.size >= _FEWEST_HOLDS and np.ptp(x) > math.log10(2.0):
-        found.append(_healing(part, found, x, y, u))
+            gained.append((math.log10(restart.hold_s), restart.static_N - pull.sliding_N))
+    log_s, gain_N = np.array(gained).reshape(-1, 2).T
+    if log_s.size >= _FEWEST_HOLDS and np.ptp(log_s) > math.log10(2.0):
+        # by the scatter about the line: most of what each static force leaves open is common to all of them
+        slope, x0, y0 = line(log_s, gain_N)
+        rest, away = gain_N - y0 - slope * (log_s - x0), log_s - x0
+        half = of_student(log_s.size - 2) * math.sqrt(float(rest @ rest) / (log_s.size - 2) / float(away @ away))
+        healing = {"healing_N_per_decade": _about(slope, half)}
+        about = {"normal_load_N": part.test.normal_load_N, "values": healing}
+        found.append(Reading(part.test.test_id, "healing", found[0].start_s, found[-1].end_s, **about))  # type: ignore[arg-type]
     return found
-
-
-def _healing(
-    part: Part, holds: Sequence[Reading], log_s: FloatArray, gain_N: FloatArray, static_u_N: FloatArray
-) -> Reading:
-    """Growth of the static force per tenfold hold; its interval by the scatter about the line, or by what the static
-    forces leave open where that is more: a few of them may lie on a line by chance."""
-    slope, x0, y0 = line(log_s, gain_N)
-    rest, away = gain_N - y0 - slope * (log_s - x0), log_s - x0
-    spread = float(away @ away)
-    by_scatter = of_student(log_s.size - 2) * math.sqrt(float(rest @ rest) / (log_s.size - 2) / spread)
-    half = max(by_scatter, NORMAL_95 * float(np.linalg.norm(away * static_u_N)) / spread)
-    values: Mapping[str, Interval] = {"healing_N_per_decade": _about(slope, half)}
-    return Reading(
-        part.test.test_id, "healing", holds[0].start_s, holds[-1].end_s, normal_load_N=part.test.normal_load_N,
-        values=values,
-    )  # fmt: skip
