@@ -76,6 +76,9 @@ def test_a_coefficient_of_a_pin_on_disc_without_a_load_asks_for_the_load(tmp_pat
         ("Date,Time,ms,Friction force (N),Normal force (N)", "%Y/%m/%d,%H:%M:%S,{ms}", ",", False),
         ("Timestamp,Friction force (N),Normal force (N)", "%Y-%m-%dT%H:%M:%S.{ms}Z", ",", False),
         ("Time,Friction force (N),Normal force (N)", "%H:%M:%S.{ms}", ",", False),
+        ("Time,Friction force (N),Normal force (N)", "%M:%S.{ms}", ",", False),
+        ("Zeit [mm:ss,0];Reibkraft [N];Normalkraft [N]", "%M:%S,{ms}", ";", True),
+        ("Time (hh:mm:ss)\tFriction (N)\tLoad (N)", "%H:%M:%S.{ms}", "\t", False),
     ],
 )
 @pytest.mark.parametrize("begins", ["2024-05-07T14:03:22.500", "2024-02-28T23:59:58.900"])

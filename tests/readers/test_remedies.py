@@ -83,6 +83,8 @@ FAULTS = [
     Fault("ambiguous_mark", table("Time [s];Force [N]", 1 + TIME, 1 + FORCE, mark=";").replace(".", ",")),
     Fault("time_of_day", "No,Time,Force [N]\n" + "".join(f"{k},Mo 09:00:{k:02d},{FORCE[k]:.3f}\n" for k in range(50)),
           fill={"NAME": "No"}),
+    Fault("time_of_day", "No,Time,Force [N]\n" + "".join(f"{k},00:{k:02d},{FORCE[k]:.3f}\n" for k in range(50)),
+          fill={"NAME": "No"}),
     Fault("missing_column", table("clock,ch1", TIME, FORCE), fill={"NAME [unit]": "ch1 [N]"},
           columns={"time": "#1 [s]"}),
     Fault("missing_column", table("clock,Force [N]", TIME, FORCE), fill={"NAME [unit]": "clock [s]"}),

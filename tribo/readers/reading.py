@@ -54,7 +54,7 @@ _INSTEAD_OF_A_CLOCK = (
 )
 _FEWEST_ALIKE = 50  # rows with one value, from which a column is said to be constant
 _ALONG_X = re.compile(r"((?:.*(?:\b|_))?[Ff]?)([xX])(\b.*)")  # "Fx [N]", "F_x", "DAQ.Fx (N)", "Force X"
-_CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
+_CLOCK = re.compile(r"(?<![\d:])\d{1,3}:\d\d(?::\d\d)?(?![\d:])")
 
 
 @dataclass(frozen=True)
@@ -551,8 +551,8 @@ def _explained(why: ReadError, machine: Machine, source: Source, layout: Layout)
     cells = [] if source.arrays else cut(source.lines(layout.start, HEAD_BYTES)[0][0], layout.delimiter)
     for k, problem in enumerate(problems):
         at = layout.names.index(problem.column) if problem.column in layout.names else len(cells)
-        if problem.kind == "missing_unit" and at < len(cells) and _CLOCK.search(cells[at]):
-            what = "a time of day, not a time in seconds"
+        if problem.kind in ("missing_unit", "unknown_unit") and at < len(cells) and _CLOCK.search(cells[at]):
+            what = "a clock, not a time in seconds"
             problems[k] = replace(problem, kind="time_of_day", what=what, found=cells[at], allowed=_INSTEAD_OF_A_CLOCK)
     if machine.advice:
         # the load that a coefficient needs is no matter of names and units
