@@ -39,6 +39,14 @@ def test_a_record_that_ends_before_the_peak_is_named(end_s: float) -> None:
     assert kind_of(Trace("short", trace.time_s[kept], trace.force_N[kept])) == "stopped_before_peak"
 
 
+@pytest.mark.parametrize("left", [1.0, 0.2, 0.02, 0.0])
+def test_a_record_without_a_force_after_its_peak_is_doubted(left: float) -> None:
+    trace = SHAPE.trace()
+    after = trace.time_s > trace.time_s[int(np.argmax(trace.force_N))]
+    pull = read_pull(replace(trace, force_N=np.where(after, left * trace.force_N, trace.force_N)))
+    assert ("force_gone" in pull.flags) is ("force_gone" in {p.kind for p in pull.problems}) is (left < 0.05)
+
+
 @pytest.mark.parametrize("share", [0.9, 0.7, 0.5])
 def test_a_clipped_peak_is_named_with_its_row(share: float) -> None:
     trace = SHAPE.trace()

@@ -65,6 +65,7 @@ _OF_STATIC = (
 )  # what a pull without a static force does not have  # fmt: skip
 _MOTION = {"rise", "slip", "running-in", "steady sliding", "stroke"}  # phases in which the force may slip
 _OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
+_GONE = 0.05  # share of the static peak below which no sliding force is left
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 
 
@@ -699,6 +700,11 @@ def _doubts(trace: Trace, pull: Pull, test: Test, *, one_speed: bool) -> list[Pr
         what = "the normal load recorded while sliding differs from that of the test"
         allowed = f"about {given:.4g} N, which is used"
         found.append(Problem("off_load", what, trace.file, None, "normal force", f"{recorded:.4g} N", allowed))
+    if abs(pull.sliding_N) < _GONE * pull.static_N:
+        what = "no force is left after its peak: the specimen broke, the slider came off, or this is no friction test"
+        seen = f"{pull.static_N:.4g} N, then {pull.sliding_N:.2g} N"
+        allowed = 'a force that stays while the slider slides; else a reason under "exclude" in tests.csv'
+        found.append(Problem("force_gone", what, trace.file, None, "force", seen, allowed))
     return found
 
 
