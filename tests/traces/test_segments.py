@@ -222,3 +222,18 @@ def test_no_window_of_a_stroke_lies_over_the_dwell_at_its_end() -> None:
         assert np.count_nonzero(~moving[inside]) <= 5  # a speed by displacement is a mean over so many samples
         assert pull.sliding_N == pytest.approx(2.0, rel=0.01)
         assert abs(pull.zero_N) == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_dead_time_at_the_end_of_a_stroke_is_no_piece_of_its_own() -> None:
+    """Four strokes of 300 samples with 100 at rest between them; the force keeps its sign until the next one moves."""
+    speed, force = [], []
+    for k in range(4):
+        way = 1.0 if k % 2 == 0 else -1.0
+        speed += [way * 1e-3] * 300 + [0.0] * 100
+        force += ([-0.8 * way * 2.0] * 2 if k else []) + [way * 2.0] * (298 if k else 300) + [0.8 * way * 2.0] * 100
+    noise = 0.01 * np.random.default_rng(5).standard_normal(1600)
+    record = Trace("r", np.arange(1600) / 50.0, np.array(force) + noise, columns={"speed_m_s": np.array(speed)})
+    pieces = split_pulls(record)
+    assert len(pieces) == 4
+    for piece in pieces:
+        assert np.count_nonzero(piece.columns["speed_m_s"]) >= 298

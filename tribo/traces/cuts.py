@@ -53,7 +53,8 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
         return (trace,)
     stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
     if speed is not None:
-        stretches = [(a, b) for a, b in stretches if (moving[a:b] > rest).any()] or stretches
+        slid = [(a, b) for a, b in stretches if np.count_nonzero(moving[a:b] > rest) >= MINIMUM_SAMPLES]
+        stretches = slid or stretches
     shortest = _FRAGMENT * float(np.median([b - a for a, b in stretches])) if stretches else 0.0
     kept = [(a, b) for a, b in stretches if b - a >= shortest] or [(0, trace.time_s.size)]
     return tuple(piece_of(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
