@@ -237,3 +237,16 @@ def test_a_dead_time_at_the_end_of_a_stroke_is_no_piece_of_its_own() -> None:
     assert len(pieces) == 4
     for piece in pieces:
         assert np.count_nonzero(piece.columns["speed_m_s"]) >= 298
+
+
+def test_a_stretch_that_moves_without_load_is_no_piece_of_its_own() -> None:
+    """The drive turns, the load comes after 15 s, and both end after 60 s; the torque goes on drifting."""
+    time = np.arange(900) / 10.0
+    turns, loaded = time < 60.0, (time > 15.0) & (time < 60.0)
+    noise = 0.002 * np.random.default_rng(6).standard_normal((2, 900))
+    load = np.where(loaded, 5.0, -0.13) + noise[0]
+    force = np.where(turns, 0.4 - 0.01 * np.minimum(time, 15.0), -0.3) + np.where(loaded, 0.3, 0.0) + noise[1]
+    record = Trace("r", time, force, columns={"normal_force_N": load, "speed_m_s": np.where(turns, 0.01, 0.0)})
+    (piece,) = split_pulls(record)
+    assert 15.0 <= piece.time_s[0] <= 15.3
+    assert 59.7 <= piece.time_s[-1] <= 60.1
