@@ -250,3 +250,9 @@ def test_a_stretch_that_moves_without_load_is_no_piece_of_its_own() -> None:
     (piece,) = split_pulls(record)
     assert 15.0 <= piece.time_s[0] <= 15.3
     assert 59.7 <= piece.time_s[-1] <= 60.1
+
+
+def test_a_force_that_stands_still_to_the_bit_does_not_relax() -> None:
+    from tribo.traces.drive import relaxes_from
+
+    assert relaxes_from(np.full(400, 2.0)) == 400

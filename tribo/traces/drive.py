@@ -530,23 +530,29 @@ def relaxes_from(force_N: FloatArray, *, clearly: bool = False) -> int:
 def _parted_at(rest: FloatArray, starts: range, taus: FloatArray) -> tuple[float, int, float, float, float]:
     """Where a force goes over from a line to an exponential: minus twice the logarithm of the likelihood, the sample,
     both scatters, and the time constant in samples; the size of the force as the sample where none was tried."""
-    floor = (1e-5 * float(np.ptp(rest)) + 1e-300) ** 2
+    floor = (1e-5 * float(np.ptp(rest))) ** 2 + 1e-300
     along = np.arange(rest.size, dtype=float)
     t, y, tt, ty, yy = (np.cumsum(v) for v in (along, rest, along**2, along * rest, rest**2))
-    best = math.inf, rest.size, 0.0, 0.0, 1.0
-    for at in starts:
-        k, n = at - 1, float(at)
-        spread = tt[k] / n - (t[k] / n) ** 2
-        rough = yy[k] / n - (y[k] / n) ** 2 - ((ty[k] / n - t[k] * y[k] / n**2) ** 2 / spread if spread > 0 else 0.0)
-        part = rest[at:] - rest[at:].mean()
-        decay = np.exp(-along[: part.size] / taus[:, None])
-        decay -= decay.mean(axis=1, keepdims=True)
-        left = float(part @ part) - (decay @ part) ** 2 / np.maximum((decay**2).sum(axis=1), 1e-300)
-        rough, smooth = max(float(rough), floor), max(float(left.min()) / part.size, floor)
-        unlikely = at * math.log(rough) + part.size * math.log(smooth)
-        if unlikely < best[0]:
-            best = unlikely, at, math.sqrt(rough), math.sqrt(smooth), float(taus[int(np.argmin(left))])
-    return best
+    at = np.array(starts)
+    if at.size == 0:
+        return math.inf, rest.size, 0.0, 0.0, 1.0
+    k, n, left = at - 1, at.astype(float), (rest.size - at).astype(float)
+    spread = tt[k] / n - (t[k] / n) ** 2
+    bend = np.where(spread > 0, (ty[k] / n - t[k] * y[k] / n**2) ** 2 / np.where(spread > 0, spread, 1.0), 0.0)
+    rough = np.maximum(yy[k] / n - (y[k] / n) ** 2 - bend, floor)
+    decay = np.exp(-along[: int(left[0])] / taus[:, None])
+    after = np.lib.stride_tricks.sliding_window_view(np.append(rest, np.zeros(decay.shape[1])), decay.shape[1])[at]
+    lasts = (rest.size - at) - 1
+    of_decay, squares = (np.cumsum(v, axis=1)[:, lasts] for v in (decay, decay**2))
+    mean = (y[-1] - y[k]) / left
+    away = yy[-1] - yy[k] - left * mean**2
+    along_decay = decay @ after.T - of_decay * mean
+    unlike = away - along_decay**2 / np.maximum(squares - of_decay**2 / left, 1e-300)
+    smooth = np.maximum(unlike.min(axis=0) / left, floor)
+    unlikely = n * np.log(rough) + left * np.log(smooth)
+    best = int(np.argmin(unlikely))
+    tau = float(taus[int(np.argmin(unlike[:, best]))])
+    return float(unlikely[best]), int(at[best]), math.sqrt(rough[best]), math.sqrt(smooth[best]), tau
 
 
 def _comes_to_rest(force: FloatArray, level: float, rest: float) -> bool:

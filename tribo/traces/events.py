@@ -9,7 +9,7 @@ to one side, are never read.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -101,10 +101,12 @@ def slips_of(
         if not spans or smallest_drop_N is not None or counted >= _CLEAR * noise:
             break
         least = max(_NEXT_TRY * counted, min(_CLEAR * noise, 2.0 * counted))
-    slips = read_between(time_s, force_N, spans, speed_m_s, stiffness_N_per_m, from_rest) if spans else ()
+    slips: tuple[Slip, ...] = ()
+    if len(spans) >= _FEWEST_SLIPS + int(from_rest):
+        slips = read_between(time_s, force_N, spans, speed_m_s, stiffness_N_per_m, from_rest)
     if _are_slips(slips[int(from_rest) :], noise):
         return slips
-    if not from_rest or not slips:
+    if not from_rest or not spans:
         return ()
     alone = [(*spans[0][:3], float(time_s[-1]))]  # the fall from the static peak to where the force settles
     return read_between(time_s, force_N, alone, speed_m_s, stiffness_N_per_m, from_rest)
@@ -328,8 +330,9 @@ def _half_swing(
 ) -> tuple[float, float, float, float] | None:
     """Failure, duration and the forces before and after that fit best, by Gauss-Newton with the lines solved for."""
 
-    def around(fail: float, lasts: float) -> tuple[float, FloatArray, FloatArray]:
-        """Squares left over by the best lines, their forces, and the step in failure and duration that lowers them."""
+    def around(fail: float, lasts: float) -> tuple[float, FloatArray, Callable[[], FloatArray]]:
+        """Squares left over by the best lines, their forces, and what gives the step in failure and duration that
+        lowers them."""
         share = (time - fail) / lasts
         inside = np.clip(share, 0.0, 1.0)
         fallen = 0.5 - 0.5 * np.cos(np.pi * inside)
@@ -353,21 +356,25 @@ def _half_swing(
         away = known - level @ basis
         b, c = (level[k] if k >= 0 else rate if math.isfinite(rate) else 0.0 for k in slopes)
         c = 0.0 if settles else c
-        steepness = (level[1] - level[0]) * (0.5 * np.pi / lasts) * np.sin(np.pi * inside)
-        by = np.array([-steepness - b * is_before - c * is_after, -steepness * inside - c * is_after])
-        full = np.concatenate((basis, by))
-        both = full @ full.T
-        both.flat[:: both.shape[0] + 1] *= 1.0 + 1e-9
-        return float(away @ away), level, np.asarray(np.linalg.solve(both, full @ away)[-2:])
+
+        def step() -> FloatArray:
+            steepness = (level[1] - level[0]) * (0.5 * np.pi / lasts) * np.sin(np.pi * inside)
+            by = np.array([-steepness - b * is_before - c * is_after, -steepness * inside - c * is_after])
+            full = np.concatenate((basis, by))
+            both = full @ full.T
+            both.flat[:: both.shape[0] + 1] *= 1.0 + 1e-9
+            return np.asarray(np.linalg.solve(both, full @ away)[-2:])
+
+        return float(away @ away), level, step
 
     fail, lasts = start
     try:
         if lasts < _NEARLY_STEP * pace:  # its place among the samples is searched, for no slope leads there
             tried = [(fail + lasts / 2 - t / 2 + d, t) for d in _PLACES * pace for t in _LENGTHS * pace]
             fail, lasts = min(tried, key=lambda place: around(*place)[0])
-        now, level, step = around(fail, lasts)
+        now, level, further = around(fail, lasts)
         for _ in range(_MOST_STEPS):
-            step = np.clip(step, -0.4 * lasts, 0.4 * lasts)
+            step = np.clip(further(), -0.4 * lasts, 0.4 * lasts)
             for _ in range(4):
                 there = fail + float(step[0]), max(lasts + float(step[1]), 0.25 * pace)
                 then = around(*there)
@@ -376,7 +383,7 @@ def _half_swing(
                 step = step / 3.0
             else:
                 break
-            gained, (fail, lasts), (now, level, step) = now - then[0], there, then
+            gained, (fail, lasts), (now, level, further) = now - then[0], there, then
             if gained < 1e-4 * now:
                 break
     except np.linalg.LinAlgError:

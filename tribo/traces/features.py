@@ -344,7 +344,7 @@ def median_with_interval(values: FloatArray) -> Feature:
 def _of_sliding(time: FloatArray, force: FloatArray, pull: Pull) -> dict[str, Feature]:
     """Drift, roughness and spectrum of the force over the sliding window."""
     from scipy.signal import welch
-    from scipy.stats import chi2, t
+    from scipy.special import gammaincinv, stdtrit
 
     if not math.isfinite(pull.window_s[0]):
         return {}
@@ -363,7 +363,7 @@ def _of_sliding(time: FloatArray, force: FloatArray, pull: Pull) -> dict[str, Fe
         slope, middle, mean = line(x, y)
         away, reach = y - mean - slope * (x - middle), x - middle
         u = math.sqrt(float(away @ away) / (x.size - 2) / float(reach @ reach))
-        half = float(t.ppf(0.975, x.size - 2)) * u
+        half = float(stdtrit(x.size - 2, 0.975)) * u
         found["drift_N_per_s"] = Feature(slope, u, slope - half, slope + half, int(x.size))
     slope, middle, mean = line(at, part)
     away = part - mean - slope * (at - middle)
@@ -371,7 +371,7 @@ def _of_sliding(time: FloatArray, force: FloatArray, pull: Pull) -> dict[str, Fe
         return found  # a force that stands still, to the bit, has neither roughness nor a frequency
     if mean:
         rough, free = float(away.std()) / abs(mean), max(part.size / _correlation_time(away), 2.0)
-        low, high = (rough * math.sqrt(free / float(chi2.ppf(p, free))) for p in (0.975, 0.025))
+        low, high = (rough * math.sqrt(free / (2.0 * float(gammaincinv(free / 2.0, p)))) for p in (0.975, 0.025))
         found["roughness"] = Feature(rough, (high - low) / (2.0 * _NORMAL), low, high, part.size)
     pace = float(at[-1] - at[0]) / (at.size - 1)
     even = np.interp(at[0] + pace * np.arange(at.size), at, away)

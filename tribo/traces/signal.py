@@ -273,9 +273,9 @@ def _cosines(n: int, first: int, count: int) -> FloatArray:
 @lru_cache(maxsize=1024)
 def of_student(dof: int) -> float:
     """Half width of a 95 % interval in standard uncertainties."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.ppf(0.975, dof))
+    return float(stdtrit(dof, 0.975))
 
 
 def steady(time_s: FloatArray, force: FloatArray) -> tuple[float, float, float, float]:
