@@ -297,6 +297,15 @@ def test_a_rest_with_an_offset_and_a_slide_about_ten_times_as_large_are_no_slipp
         assert read_export(path).flags == (), seed
 
 
+def test_a_reversal_that_one_sample_shows_half_way_is_no_slipped_mark() -> None:
+    """The drive stands before the strokes turn, so that the force is ten times as rough after the turn as before it."""
+    for seed in range(40):
+        rng = np.random.default_rng([seed, 5])
+        rest, slide = 0.005 * rng.standard_normal(200) - 3.36, 0.05 * rng.standard_normal(400) + 3.5
+        force = np.concatenate((-slide, rest, [rng.uniform(0.3, 0.42)], slide))
+        assert check_scale(force, "a.csv", "force", int) == [], seed
+
+
 def test_two_impulses_are_no_stretch_between_them(path: Path) -> None:
     force = pulled(np.random.default_rng(3))
     force[[180, 200]] *= 10

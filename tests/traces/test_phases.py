@@ -333,3 +333,39 @@ def test_a_pull_that_begins_below_zero_is_no_stroke() -> None:
     time = np.arange(1000) / 50
     force = np.interp(time, [0, 3, 5, 5.5, 20], [-1.0, -1.0, 1.0, 0.5, 0.5]) + noise(1000)
     assert [p.name for p in phases_of(Trace("pull", time, force))] == ["rest", "rise", "slip", "steady sliding"]
+
+
+def slid_and_held(holds: tuple[int, ...], seed: int, *, rough: float, still: float) -> Trace:
+    """A sled at 50 Hz that rests, slides for 1000 samples and is held, again and again; force 5, held 3.7 N."""
+    rng = np.random.default_rng(seed)
+    parts = [still * rng.standard_normal(250)]
+    for hold in (*holds, 0):
+        slide = 5.0 + rough * lfilter([1.0], [1.0, -0.5], rng.standard_normal(1000))
+        slide[:40] += 0.8 * np.exp(-np.arange(40) / 8.0)
+        rise = np.linspace(0.0, 1.0, 6) if len(parts) == 1 else np.array([0.8, 1.0])  # as steep, by one spring
+        slide[: rise.size] *= rise
+        parts += [slide, 3.7 + 1.3 * np.exp(-np.arange(hold) / 30.0) + still * rng.standard_normal(hold)]
+    force = np.concatenate(parts)
+    return Trace("held", np.arange(force.size) / 50.0, force)
+
+
+def test_every_hold_of_a_slide_is_placed_within_ten_samples_by_its_force_the_shortest_too() -> None:
+    holds = (150, 400, 1600, 6000)
+    begins = np.cumsum([250, *(1000 + hold for hold in holds)])[:-1] / 50.0 + 20.0
+    for seed in range(12):
+        rough, still = ((0.02, 0.01), (0.05, 0.001))[seed % 2]
+        found = of_phase(slid_and_held(holds, seed, rough=rough, still=still), "hold")
+        assert [a for a, _ in found] == pytest.approx(begins.tolist(), abs=0.2), seed
+        assert [b for _, b in found] == pytest.approx((begins + np.array(holds) / 50.0).tolist(), abs=0.2), seed
+
+
+def test_the_window_of_a_pull_ends_within_ten_samples_of_where_the_force_begins_to_relax() -> None:
+    """The force falls by a tenth, with a time constant of half a second, and the load is taken off later."""
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        slide = 2.0 + 0.04 * lfilter([1.0], [1.0, -0.6], rng.standard_normal(2200))
+        slide[:8] *= np.linspace(0.0, 1.0, 8)
+        relaxed = 1.8 + 0.2 * np.exp(-np.arange(350) / 25.0)
+        force = np.concatenate((np.zeros(600), slide, relaxed, np.zeros(280))) + 0.003 * rng.standard_normal(3430)
+        pull = read_pull(Trace("p", np.arange(3430) / 50.0, force))
+        assert pull.window_s[1] == pytest.approx(2800 / 50.0, abs=0.2), seed

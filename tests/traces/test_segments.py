@@ -256,3 +256,12 @@ def test_a_force_that_stands_still_to_the_bit_does_not_relax() -> None:
     from tribo.traces.drive import relaxes_from
 
     assert relaxes_from(np.full(400, 2.0)) == 400
+
+
+def test_a_rest_at_an_offset_before_a_pull_is_no_stroke_the_other_way() -> None:
+    """The load cell stands at -0.3 N, the sled is drawn with 0.4 N above it."""
+    rng = np.random.default_rng(8)
+    rest, slide = 0.003 * rng.standard_normal(250) - 0.3, 0.012 * rng.standard_normal(1500) + 0.1
+    assert reversals(np.concatenate((rest, slide))) == []
+    forward_and_back = np.concatenate((0.012 * rng.standard_normal(700) - 0.3, slide))
+    assert reversals(forward_and_back) == [700]

@@ -318,8 +318,9 @@ def _is_impulse(values: FloatArray, k: int) -> bool:
 
 def _to_the_end(values: FloatArray, step: FloatArray, large: NDArray[np.int64]) -> tuple[int, int, float] | None:
     """(first row, rows, factor) of rows off by a power of ten from one on, or None."""
+    passing = set((large + 1).tolist())  # a row between two large steps is on its way, as in a reversal: no level
     for k in (int(at) for at in large):
-        if min(k, step.size - k - 1) < _FEWEST_ROWS:
+        if min(k, step.size - k - 1) < _FEWEST_ROWS or k in passing:
             continue
         change = _typical(np.abs(step[max(k - _ROWS_BESIDE, 0) : k])), _typical(np.abs(step[k + 1 :][:_ROWS_BESIDE]))
         for rows in _LEVEL_ROWS:

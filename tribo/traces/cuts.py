@@ -125,6 +125,11 @@ def reversals(force_N: FloatArray) -> list[int]:
         low, high = (sample_noise(force_N[side == way]) for way in (-1, 1))
         if low < _AT_REST_AS_ROUGH * high:
             return []
+    if changed.size == 1:  # nor is one before it alone, where nothing moves the force
+        first, other = (force_N[side == way] for way in (side[decided[0]], -side[decided[0]]))
+        scatter = float(np.ptp(np.percentile(first, (5.0, 95.0)))) / 3.29
+        if scatter < _AT_REST_AS_ROUGH * sample_noise(other):
+            return []
     return [
         int(a) + 1 + int(np.argmin(np.abs(force_N[a + 1 : b + 1] - middle))) for a, b in zip(before, after, strict=True)
     ]

@@ -325,8 +325,9 @@ def levels_of(values: FloatArray) -> list[tuple[int, int, float]]:
 
 def level_cuts(values: FloatArray) -> list[Range]:
     """(end of a level, start of the next) wherever a channel goes from one steady level to another."""
-    calm = median_of_three(values)
-    return [_passage(calm, one, other) for one, other in pairwise(levels_of(values))]
+    levels = levels_of(values)
+    calm = median_of_three(values) if len(levels) > 1 else values
+    return [_passage(calm, one, other) for one, other in pairwise(levels)]
 
 
 def speed_cuts(trace: Trace, drive: DriveMotion, span: Range) -> list[Range]:
@@ -425,6 +426,9 @@ _AHEAD = 5  # samples of each of the two means that say how a force goes on
 _SURELY = 0.35  # share of the way from the roughness at rest to that of a slide below which a part stands still
 _SETTLES = 0.25  # share of its whole fall by which a force still changes in the last third of a stop
 _GAP = 4  # widths that a fall of the force at rest is felt at the most
+_STOP_IN_WIDTHS = 8  # widths of a stop that tell when it began
+_FALLS_FIRST = 0.25  # share of its fall by which a force has fallen between two samples of which one began its stop
+_BEFORE_STOP = 12  # widths before a stop that tell the level of the slide
 _DWELLS = 0.4  # share of its rise that a stop dwells before the force climbs
 _MOST_TRIED = 2000  # samples of a stroke among which its stop is looked for
 _COARSELY = 150  # and at first
@@ -464,13 +468,14 @@ def standstills(force_N: FloatArray) -> tuple[list[Range], int] | None:
     for a, b in zip(*runs_of(smooth), strict=True):
         if b - a < least or not (~smooth[:a]).any() or float(np.median(rough[a:b])) > quiet:
             continue
-        before = force[max(slid, a - 12 * width) : max(a - width // 2, slid + 1)]
+        before = force[max(slid, a - _BEFORE_STOP * width) : max(a - width // 2, slid + 1)]
         if before.size < FEWEST_AT_REST:
             continue
         calm += 1
         level, scatter = float(np.median(before)), max(float(before.std()), slide)
         stop = _stop(force, int(a), int(b), width, level - _LEVEL * scatter, rest)
         restart = _restart(force, stop, min(int(b) + 2 * width, n), rest)
+        stop = began_by(force, slid, stop, min(restart, stop + _STOP_IN_WIDTHS * width))
         if restart - stop < max(least // 2, 1) or float(np.median(force[stop:restart])) > level - below * scatter:
             continue
         if b == n:
@@ -525,6 +530,20 @@ def relaxes_from(force_N: FloatArray, *, clearly: bool = False) -> int:
     if clearly:  # a force with steps is far from its line and not rough
         found = found and sample_noise(rest[:at]) > _CONTRAST * sample_noise(rest[at:])
     return (skip + at) * factor if found else force_N.size
+
+
+def began_by(force_N: FloatArray, slid: int, stop: int, end: int) -> int:
+    """The sample at which a stop began that was seen at ``stop``, by the force from ``slid`` on and up to ``end``.
+
+    From there on the force falls; what is still at the level of the slide is none of a stop.
+    """
+    early = max(slid, stop - 2 * (end - stop))
+    began = early + relaxes_from(force_N[early:end])
+    if not early < began < stop:
+        return stop
+    parts = np.split(force_N[early : min(2 * stop - began, end)], (began - early, stop - early))
+    before, between, after = (float(np.median(part)) for part in parts)
+    return began if before - between > _FALLS_FIRST * (before - after) else stop
 
 
 def _parted_at(rest: FloatArray, starts: range, taus: FloatArray) -> tuple[float, int, float, float, float]:
@@ -589,14 +608,15 @@ def _stop(force: FloatArray, a: int, b: int, width: int, slides_above: float, re
     """The sample at which a smooth part begins: after the last one at the level of the slide, or that does not go on as
     the samples after it, whichever is earlier."""
     first, middle = max(a - 2 * width, 0), (a + b) // 2
+    slid = max(a - _BEFORE_STOP * width, 0)
     total = np.concatenate(([0.0], np.cumsum(force)))
     index = np.arange(first, min(middle, force.size - 2 * _AHEAD - 1))
     near = (total[index + 1 + _AHEAD] - total[index + 1]) / _AHEAD
     far = (total[index + 1 + 2 * _AHEAD] - total[index + 1 + _AHEAD]) / _AHEAD
     onward = near + (near - far) * (_AHEAD + 1) / (2.0 * _AHEAD)
     loud = np.flatnonzero(np.abs(force[index] - onward) > _LOUD * rest)
-    high = np.flatnonzero(force[first:middle] >= slides_above)
-    ends = [first + int(found[-1]) + 1 for found in (loud, high) if found.size]
+    high = np.flatnonzero(force[slid:middle] >= slides_above)
+    ends = [begin + int(found[-1]) + 1 for begin, found in ((first, loud), (slid, high)) if found.size]
     return _where_it_relaxes(force, min(ends, default=a), b, width, rest)
 
 

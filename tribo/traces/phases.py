@@ -21,6 +21,7 @@ from tribo.traces.drive import (
     FEWEST_AT_REST,
     DriveMotion,
     Range,
+    began_by,
     drive_of,
     drive_stops,
     level_cuts,
@@ -57,11 +58,11 @@ _FALLEN = 0.5  # share of the sliding force below which a force has fallen, wher
 _AT_BOTTOM = 0.35  # share of the depth of a fall near its lowest force, in which a stop spends most of its time
 _SHORTEST_STOP = 0.005  # share of a record that a stop lasts at least, where nothing but the force tells of it
 _MOST_STOPS = 50
-_RESOLVED = 4  # samples of the middle half of a rise from which on its slope is told
 _AS_STEEP = 0.4  # a restart is at least this share as steep as the first rise
 _SLOW_FALL = 3.0  # a force relaxes while the drive stands still for at least this many times the time of the next rise
 _DWELLS = 0.05  # share of the samples of a fall that lie at a level at which the force dwells
 _RESTART = 0.05  # share of the force by which it rises at a restart
+_TELLING = 200  # samples of a stop that tell when it began
 _SWINGS = 8.0  # times noise that is correlated over which it does not swing by itself
 _RETURNS = 0.02  # share of the later part of a record that lies below the force it begins with if it began in motion
 _UNPULLED = 0.3  # share of the usual force below which a record begins with nothing pulled
@@ -147,6 +148,17 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
         told = standstills(_over_load(trace, signal, contact).force_N[contact[0] : contact[1]])
     if told is not None:
         stops, end = [(contact[0] + a, contact[0] + b) for a, b in told[0]], contact[0] + told[1]
+        if stops:  # shorter ones than the roughness tells fall as low
+            even = _over_load(trace, signal, contact)
+            ends = [(even.force_N[max(a - _TELLING, 0) : a], even.force_N[a:b]) for a, b in stops]
+            slid, held = (float(np.median([np.median(part) for part in parts])) for parts in zip(*ends, strict=True))
+            stops += [
+                (a, b)
+                for a, b in force_stops(even, (contact[0], end), in_motion=at_once)
+                if all(b <= stop or a >= restart for stop, restart in stops)
+                and float(np.median(even.force_N[(a + b) // 2 : b])) < (slid + held) / 2.0
+            ]
+            stops.sort()
     elif moving is None:
         stops, end = force_stops(_over_load(trace, signal, contact), contact, in_motion=at_once), contact[1]
         if drive is not None and drive.moving.any():
@@ -273,7 +285,7 @@ def force_stops(signal: Signal, contact: Range, *, in_motion: bool) -> list[Rang
     stops = [stop for dip in dips if (stop := _stop_in(height, dip))]
     if not stops and not in_motion:
         stops = _relaxations(signal.time_s[first:last], height, top, signal.noise_N)
-    return [(first + a, first + b) for a, b in stops] if len(stops) <= _MOST_STOPS else []
+    return [(first + int(a), first + int(b)) for a, b in stops] if len(stops) <= _MOST_STOPS else []
 
 
 def _stop_in(height: FloatArray, dip: Range) -> Range | None:
@@ -293,26 +305,32 @@ def _relaxations(time_s: FloatArray, height: FloatArray, top: float, noise: floa
     peaks, troughs = turning_points(height, max(_RESTART * top, _FELT * noise, _SWINGS * rough))
     if peaks.size < 2 or troughs.size == 0:
         return []
-    first_pace, resolved = _pace(time_s, height, 0, int(peaks[0]))
-    if not resolved:
-        return []
+    first_pace, first_lasts = _pace(time_s, height, 0, int(peaks[0]))
     found = []
-    for peak, trough, after in zip(peaks, troughs, peaks[1:], strict=False):
+    for peak, lowest, after in zip(peaks, troughs, peaks[1:], strict=False):
+        near = height[lowest] + _AT_BOTTOM / 2 * (height[after] - height[lowest])
+        trough = lowest + int(np.flatnonzero(height[lowest:after] <= near)[-1])
         rise_s, fall_s = float(time_s[after] - time_s[trough]), float(time_s[trough] - time_s[peak])
-        pace, resolved = _pace(time_s, height, int(trough), int(after))
-        if resolved and pace > _AS_STEEP * first_pace and fall_s > _SLOW_FALL * rise_s:
-            found.append((_relaxes_from(height, int(peak), int(trough), noise), int(trough)))
+        pace, lasts = _pace(time_s, height, trough, int(after))
+        at_once = pace > _AS_STEEP * first_pace or lasts <= first_lasts
+        if at_once and fall_s > _SLOW_FALL * rise_s:
+            stop = _relaxes_from(height, int(peak), trough, noise)
+            half = (float(np.median(height[peak : stop + 1])) + height[lowest]) / 2.0
+            fallen = int(peak) + int(np.flatnonzero(height[peak:trough] > half)[-1]) + 1
+            began = began_by(height, int(peak), fallen, min(trough, fallen + _TELLING))
+            stop = began if began < fallen else stop
+            found += [(stop, trough)] if trough > stop else []
     return found
 
 
-def _pace(time_s: FloatArray, height: FloatArray, start: int, end: int) -> tuple[float, bool]:
-    """Slope of the middle half of a rise, and whether samples resolve it."""
+def _pace(time_s: FloatArray, height: FloatArray, start: int, end: int) -> tuple[float, int]:
+    """Slope of the middle half of a rise, and how many samples it lasts, one at the least."""
     low = height[start] + 0.25 * (height[end] - height[start])
     high = height[start] + 0.75 * (height[end] - height[start])
     part = height[start : end + 1]
     a = start + int(np.flatnonzero(part <= low)[-1]) if (part <= low).any() else start
-    b = start + int(np.argmax(part >= high))
-    return (line(time_s[a : b + 1], height[a : b + 1])[0] if b > a else float("inf")), b - a >= _RESOLVED
+    b = max(start + int(np.argmax(part >= high)), a + 1)
+    return line(time_s[a : b + 1], height[a : b + 1])[0], b - a
 
 
 def _relaxes_from(height: FloatArray, peak: int, trough: int, noise: float) -> int:
