@@ -123,7 +123,7 @@ class LawsAcross:
     """All laws of one number of terms: the best ones, and what chance and nesting make of the best.
 
     ``p`` is the share of reassignments of the deviations whose best law errs no more, ``nested`` the rms error of ln T
-    of patterns for which the law was chosen without them, ``chosen`` the law of each.
+    of patterns for which the law was chosen without them.
     """
 
     deviations: Deviations
@@ -133,7 +133,6 @@ class LawsAcross:
     p: float
     chance: float  # median error of the best law of a reassignment
     nested: float
-    chosen: tuple[LawAcross, ...]
 
     @property
     def best(self) -> LawAcross:
@@ -175,10 +174,10 @@ def _searched(d: Deviations, terms: Sequence[Term], k: int, orders: Sequence[tup
     ranked = np.argsort(errors, kind="stable")
     by_chance = left_out_errors(columns, d.log_ratio, laws, orders).min(axis=1)
     best = tuple(_law(d, terms, laws[i], float(errors[i])) for i in ranked[:LISTED])
-    chosen = tuple(_nested(d, terms, laws, columns))
+    nested = [law.error**2 for law in _nested(d, terms, laws, columns)]
     return LawsAcross(
         d, k, len(laws), best, float((1 + np.sum(by_chance <= SAME * errors[ranked[0]])) / (1 + len(by_chance))),
-        float(np.median(by_chance)), float(np.sqrt(np.mean([law.error**2 for law in chosen]))), chosen,
+        float(np.median(by_chance)), float(np.sqrt(np.mean(nested))),
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ _COSINES_OF_STEP = 8  # that of a change at once
 _COSINES_OF_STROKE = 4  # the same of a stroke, whose neighbours tell of its noise as well
 _FEWEST = 12  # samples from which on a mean has an interval
 _MIDDLE = 0.4  # share of a stroke, around its middle, whose force is that of the stroke
+_STROKES_DIFFER = 0.1  # probability by chance below which strokes of one way differ by more than their noise
 _FEWEST_APART = 4  # differences between strokes of one way from which on they tell of the noise of a stroke
 _DIFFER = 0.05  # share by which speeds or loads of two plateaus differ that make a step
 _BLOCKS = 240  # means along a slide by which its running-in is told
@@ -248,6 +249,8 @@ class _Stroke:
 
 def _strokes(parts: Sequence[Part]) -> list[_Stroke]:
     """The strokes of a record: its pieces where it was cut at its reversals, else its phases."""
+    from scipy.special import fdtrc
+
     found = []
     for part in parts:
         phases = [p for p in part.pull.phases if p.name == "stroke"]
@@ -268,8 +271,12 @@ def _strokes(parts: Sequence[Part]) -> list[_Stroke]:
     dof = sum(cosines for _, cosines in noise)
     side = means > (means.max() + means.min()) / 2.0
     apart = np.concatenate([np.diff(means[side]), np.diff(means[~side])])
-    if apart.size >= _FEWEST_APART and (between := float(apart @ apart) / apart.size / 2.0) > squares:
-        squares, dof = between, int(apart.size)  # from stroke to stroke of one way
+    if apart.size >= _FEWEST_APART:  # from stroke to stroke of one way
+        between, count = float(apart @ apart) / apart.size / 2.0, int(apart.size)
+        if squares == 0.0 or fdtrc(count, dof, between / squares) < _STROKES_DIFFER:
+            squares, dof = between, count
+        else:
+            squares, dof = (dof * squares + count * between) / (dof + count), dof + count
     half = of_student(dof) * math.sqrt(squares)
     return [
         _Stroke(part, phase, _about(float(mean), half), phase.speed_m_s)
