@@ -308,7 +308,7 @@ def impulses(e: Export, rng: random.Random) -> bytes:
     return e.bytes()
 
 
-@kind("several_tables", "time_goes_back", "text_in_numbers", "wrong_number_of_cells")
+@kind("several_tables", "header_again", "time_goes_back", "text_in_numbers", "wrong_number_of_cells")
 def the_header_again_in_the_middle(e: Export, rng: random.Random) -> bytes:
     start = e.while_pulling(rng)
     e.rows[start:start] = [[line] for line in e.above]

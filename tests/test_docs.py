@@ -104,8 +104,12 @@ class MadeOnce:
 
     def read(self, campaign: Campaign, **how: Any) -> Ingested:
         """What ``tribo.stages.ingest`` gives."""
-        here = campaign.root == self.example.campaign.root
-        return replace(self.example, campaign=campaign) if here else real_ingest(campaign, **how)
+        same = self.is_example(campaign) and how.get("rule", "first_peak") == "first_peak"
+        return replace(self.example, campaign=campaign) if same else real_ingest(campaign, **how)
+
+    def is_example(self, campaign: Campaign) -> bool:
+        whole = self.example.campaign
+        return campaign.root == whole.root and len(campaign.tests) == len(whole.tests)
 
     def __getattr__(self, name: str) -> Any:
         real = getattr(tribo, name)
@@ -113,7 +117,7 @@ class MadeOnce:
             return real
 
         def once(*args: Any, **options: Any) -> Any:
-            if name == "ingest" and not options and args[0].root == self.example.campaign.root:
+            if name == "ingest" and not options and self.is_example(args[0]):
                 return self.example
             key = (name, *(str(a) if isinstance(a, str | Path) else id(a) for a in args), repr(options))
             if key not in self.made:

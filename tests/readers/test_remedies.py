@@ -263,7 +263,7 @@ NOTHING_TO_STATE = {
     "bad_mat", "bad_tdms", "header_only", "not_an_export", "impossible_number", "too_many_rows", "more", "one_column",
     "decimal_is_delimiter", "no_exports", "exists", "short", "no_export",
     "time_repeats", "coarse_clock", "time_gap", "uneven_time", "no_zero_phase", "flat_top", "all_zero",
-    "only_beginning", "footer",
+    "only_beginning", "footer", "header_again",
     "empty_end", "empty_start", "other_candidate", "accepted", "column_not_here", "no_time",
 }  # fmt: skip
 

@@ -298,6 +298,19 @@ def test_the_buffers_of_a_long_acquisition_are_one_record(tmp_path: Path, pause_
     np.testing.assert_allclose(np.concatenate([trace.force_N for trace in traces]), FRICTION, atol=1e-5)
 
 
+@pytest.mark.parametrize(("sizes", "doubted"), [((N // 3,) * 3, False), ((20, N - 20), True), ((N - 20, 20), True)])
+def test_a_header_that_is_none_of_a_series_of_buffers_is_doubted(
+    tmp_path: Path, sizes: tuple[int, ...], doubted: bool
+) -> None:
+    text = "MTS793|BTW|ENU|1|2|.|/|:|1|0|0|A\n"
+    for block in np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1]):
+        text += f"\nData Acquisition:\tTimed\t\tTime:\t{TIME[block[-1]]:.3f}\ts\nAxial Force\tTime\nN\ts\n"
+        text += "".join(f"{FRICTION[k]:.5f}\t{TIME[k]:.3f}\n" for k in block)
+    (tmp_path / "a.dat").write_text(text, encoding="utf-8")
+    (trace,) = read_blocks(tmp_path / "a.dat")
+    assert ("header_again" in trace.flags) == doubted
+
+
 @pytest.mark.parametrize(
     "names",
     ["Fh (N),Fv (N)", "Fuerza horizontal (N),Fuerza vertical (N)", "Force horizontale (N),Force verticale (N)",

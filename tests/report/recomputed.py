@@ -5,6 +5,7 @@ Every check takes away what it has recomputed from the text of the page; whateve
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -217,7 +218,7 @@ def of_models(w: Written, text: str, context: dict[str, str]) -> str:
         return ""
 
     text = re.sub(
-        r"is ([\d.]+) % for the calibrated model, ([\d.]+) % with the simulated effect and ([\d.]+) % with the law",
+        r"by ([\d.]+) %, from the model with the simulated effect by ([\d.]+) % and with the formula by ([\d.]+) %",
         rms, text,
     )  # fmt: skip
 
@@ -235,7 +236,13 @@ def of_models(w: Written, text: str, context: dict[str, str]) -> str:
         return w.equal("highest change", found[2].replace("-", "−"), signed(change.max()))
 
     alone = (w.layers["kind"] == "cause").sum() == 1 if len(w.layers) else False
-    return re.sub(r"calibrated model changes by ([+−-]\d+) to ([+−-]\d+) %", moved if alone else "", text)
+    text = re.sub(r"changes the calibrated model by ([+−-]\d+) to ([+−-]\d+) %", moved if alone else "", text)
+
+    def narrowed(found: re.Match[str]) -> str:
+        verdict = json.loads((w.out / "verdict.json").read_text(encoding="utf-8"))
+        return w.equal("width", found[1], f"{100 * verdict['next_test']['design']['share_of_width']:.0f}")
+
+    return re.sub(r"narrows to about (\d+) % of its width", narrowed, text)
 
 
 def significant(value: float, digits: int) -> str:

@@ -272,7 +272,8 @@ def read_tables(
 def _of_one_buffer(read: Sequence[ReadTable]) -> list[ReadTable]:
     """Blocks of one acquisition, of which each goes on one time step after the last, as the record they are cut from.
 
-    Rows are then counted as if the headers between them were rows as well.
+    Rows are then counted as if the headers between them were rows as well. Buffers are alike in size, but for a shorter
+    last one; a header that stands again elsewhere is a doubt.
     """
     records = [[read[0]]]
     for block in read[1:]:
@@ -289,12 +290,22 @@ def _of_one_buffer(read: Sequence[ReadTable]) -> list[ReadTable]:
             blocks[0],
             layout=replace(blocks[0].layout, end=blocks[-1].layout.end),
             arrays={q: np.concatenate([b.arrays[q] for b in blocks]) for q in blocks[0].arrays},
-            findings=tuple(problem for b in blocks for problem in b.findings),
+            findings=tuple(problem for b in blocks for problem in (*b.findings, *_copied_header(blocks, b))),
         )
         if len(blocks) > 1
         else blocks[0]
         for blocks in records
     ]
+
+
+def _copied_header(blocks: Sequence[ReadTable], block: ReadTable) -> list[Problem]:
+    """A doubt of the second of blocks that are no series of buffers: the header above it may be a copy."""
+    sizes = [b.arrays["time"].size for b in blocks]
+    alike = len(blocks) > 2 and len(set(sizes[:-1])) == 1 and sizes[-1] <= sizes[0]
+    if alike or block is not blocks[1]:
+        return []
+    what = "the header stands again in the middle of the table; the rows above and below it were read as one record"
+    return [Problem("header_again", what, block.source.file, block.row_of(0) - 1, allowed="one header above all rows")]
 
 
 def _lacks_time(outcome: ReadTable | ReadError) -> bool:
