@@ -290,7 +290,7 @@ def _of_one_buffer(read: Sequence[ReadTable]) -> list[ReadTable]:
             blocks[0],
             layout=replace(blocks[0].layout, end=blocks[-1].layout.end),
             arrays={q: np.concatenate([b.arrays[q] for b in blocks]) for q in blocks[0].arrays},
-            findings=tuple(problem for b in blocks for problem in (*b.findings, *_copied_header(blocks, b))),
+            findings=(*(problem for b in blocks for problem in b.findings), *_copied_header(blocks)),
         )
         if len(blocks) > 1
         else blocks[0]
@@ -298,14 +298,14 @@ def _of_one_buffer(read: Sequence[ReadTable]) -> list[ReadTable]:
     ]
 
 
-def _copied_header(blocks: Sequence[ReadTable], block: ReadTable) -> list[Problem]:
-    """A doubt of the second of blocks that are no series of buffers: the header above it may be a copy."""
+def _copied_header(blocks: Sequence[ReadTable]) -> list[Problem]:
+    """A doubt of blocks that are no series of buffers: the header above the second may be a copy."""
     sizes = [b.arrays["time"].size for b in blocks]
-    alike = len(blocks) > 2 and len(set(sizes[:-1])) == 1 and sizes[-1] <= sizes[0]
-    if alike or block is not blocks[1]:
+    if len(blocks) > 2 and len(set(sizes[:-1])) == 1 and sizes[-1] <= sizes[0]:
         return []
+    file, row = blocks[1].source.file, blocks[1].row_of(0) - 1
     what = "the header stands again in the middle of the table; the rows above and below it were read as one record"
-    return [Problem("header_again", what, block.source.file, block.row_of(0) - 1, allowed="one header above all rows")]
+    return [Problem("header_again", what, file, row, allowed="one header above all rows")]
 
 
 def _lacks_time(outcome: ReadTable | ReadError) -> bool:

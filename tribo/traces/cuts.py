@@ -127,7 +127,7 @@ def reversals(force_N: FloatArray) -> list[int]:
             return []
     if changed.size == 1:  # nor is one before it alone, where nothing moves the force
         first, other = (force_N[side == way] for way in (side[decided[0]], -side[decided[0]]))
-        scatter = float(np.ptp(np.percentile(first, (5.0, 95.0)))) / 3.29
+        scatter = float(np.ptp(np.percentile(first, (5.0, 95.0)))) / 3.29  # standard deviations between them
         if scatter < _AT_REST_AS_ROUGH * sample_noise(other):
             return []
     return [

@@ -128,6 +128,8 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
     drive = drive_of(trace)
     moving = drive.moving if drive is not None and not drive.turns else None
     begins_at_rest = moving is None or not moving[: FEWEST_AT_REST * 2].all()
+    even = _over_load(trace, signal, contact) if moving is None or not (begins_at_rest or contact[0]) else signal
+    turns_at = reversals(signal.force_N) if moving is None else []
     rests: list[Range] = []
     stops: list[Range] = []
     end = contact[1]
@@ -138,18 +140,16 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
         at_once = bool(moving[max(contact[0] - 2, 0) : contact[0] + 2].all())
     elif moving is None or not begins_at_rest:
         turns = contact_kind in TURNING or (drive is not None and drive.channel in ("speed", "rotation speed"))
-        even = _over_load(trace, signal, contact)
         at_once = _returns(even, touching)
         at_once = at_once or _begins_high(even, touching, turns=turns, told=turns and moving is not None)
     else:
         at_once = False
     told = None
-    if drive is None and not reversals(signal.force_N):
-        told = standstills(_over_load(trace, signal, contact).force_N[contact[0] : contact[1]])
+    if drive is None and not turns_at:
+        told = standstills(even.force_N[contact[0] : contact[1]])
     if told is not None:
         stops, end = [(contact[0] + a, contact[0] + b) for a, b in told[0]], contact[0] + told[1]
         if stops:  # shorter ones than the roughness tells fall as low
-            even = _over_load(trace, signal, contact)
             ends = [(even.force_N[max(a - _TELLING, 0) : a], even.force_N[a:b]) for a, b in stops]
             slid, held = (float(np.median([np.median(part) for part in parts])) for parts in zip(*ends, strict=True))
             stops += [
@@ -160,16 +160,16 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
             ]
             stops.sort()
     elif moving is None:
-        stops, end = force_stops(_over_load(trace, signal, contact), contact, in_motion=at_once), contact[1]
+        stops, end = force_stops(even, contact, in_motion=at_once), contact[1]
         if drive is not None and drive.moving.any():
             end = min(end, int(np.flatnonzero(drive.moving)[-1]) + 1)
         else:
-            last = max(reversals(signal.force_N), default=0)
+            last = max(turns_at, default=0)
             end = min(end, last + quiet_end(signal.force_N[last:]))
         end = max(end, stops[-1][1] + 1) if stops else end
-    if drive is None and not reversals(signal.force_N):
+    if drive is None and not turns_at:
         last = stops[-1][1] if stops else contact[0]
-        force = _over_load(trace, signal, contact).force_N[last:end]
+        force = even.force_N[last:end]
         for _ in range(2):  # the drive stops, and later the load is taken off
             force = force[: relaxes_from(force, clearly=True)]
         end = last + force.size
