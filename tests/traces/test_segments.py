@@ -239,7 +239,7 @@ def test_a_dead_time_at_the_end_of_a_stroke_is_no_piece_of_its_own() -> None:
         assert np.count_nonzero(piece.columns["speed_m_s"]) >= 298
 
 
-def test_a_stretch_that_moves_without_load_is_no_piece_of_its_own() -> None:
+def test_a_stretch_that_moves_without_load_is_no_pull_and_keeps_its_number() -> None:
     """The drive turns, the load comes after 15 s, and both end after 60 s; the torque goes on drifting."""
     time = np.arange(900) / 10.0
     turns, loaded = time < 60.0, (time > 15.0) & (time < 60.0)
@@ -247,9 +247,12 @@ def test_a_stretch_that_moves_without_load_is_no_piece_of_its_own() -> None:
     load = np.where(loaded, 5.0, -0.13) + noise[0]
     force = np.where(turns, 0.4 - 0.01 * np.minimum(time, 15.0), -0.3) + np.where(loaded, 0.3, 0.0) + noise[1]
     record = Trace("r", time, force, columns={"normal_force_N": load, "speed_m_s": np.where(turns, 0.01, 0.0)})
-    (piece,) = split_pulls(record)
+    unloaded, piece = split_pulls(record)
+    assert unloaded.time_s[-1] <= 15.1
     assert 15.0 <= piece.time_s[0] <= 15.3
     assert 59.7 <= piece.time_s[-1] <= 60.1
+    (pull,) = read_pulls(record)
+    assert pull.test_id == "r/2"
 
 
 def test_a_force_that_stands_still_to_the_bit_does_not_relax() -> None:

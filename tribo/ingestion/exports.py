@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
 _DISTURBED = 0.03  # share by which load and speed differ at the most, and of a record, where a slide was only disturbed
-_UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 _LABELLED = 0.9  # share of exports that name their own test from which on a header that names another one counts
 _FEWEST = 5
 _LEVELS_DIFFER = 0.2  # share by which the highest level of a speed or load exceeds the lowest where they make a ladder
@@ -253,7 +252,7 @@ def _whole(
     They are recognised by steps of load or speed, or by reversals.
     """
     from tribo.readers import read_export
-    from tribo.traces import split_pulls
+    from tribo.traces import carry_load, split_pulls
 
     named, choice = split_choice(str(path))
     table = choice.removesuffix(WHOLE).removesuffix("/")
@@ -262,7 +261,7 @@ def _whole(
     if choice.endswith(WHOLE):
         return trace
     pieces = split_pulls(trace)
-    loaded = [] if len(pieces) == 1 else [k for k, there in enumerate(_carry_load(pieces)) if there]
+    loaded = [] if len(pieces) == 1 else [k for k, there in enumerate(carry_load(pieces)) if there]
     loaded = [k for n, k in enumerate(loaded) if not n or not _goes_on(trace, pieces[loaded[n - 1]], pieces[k])]
     if len(loaded) < 2:
         return trace
@@ -280,7 +279,7 @@ def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, Pull
     Each has the speed and load of its level, how long it lasts, and whether it was reached on the way ``up`` or
     ``down``.
     """
-    from tribo.traces import load_of, pieces_of
+    from tribo.traces import carry_load, load_of, pieces_of
     from tribo.traces.drive import rotation_level_rev_per_s, speed_level_m_s
     from tribo.traces.phases import under_load_s
 
@@ -292,7 +291,7 @@ def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, Pull
     pieces = pieces_of(plain, options)
     if any(own.begins == "reversal" for _, own in pieces.values()):
         return []  # strokes
-    loaded = dict(zip(pieces, _carry_load([piece for piece, _ in pieces.values()]), strict=True))
+    loaded = dict(zip(pieces, carry_load([piece for piece, _ in pieces.values()]), strict=True))
     pieces = {address: found for address, found in pieces.items() if loaded[address]}
     begin_s, end_s = under_load_s(plain, options.contact)  # neither an approach nor a rest after the slide is a level
     pieces = {a: found for a, found in pieces.items() if begin_s <= float(np.median(found[0].time_s)) <= end_s}
@@ -332,14 +331,14 @@ def _chosen(
     Where all pulls are chosen, those without a load are left out, and a doubt of the first one names them.
     """
     from tribo.readers import read_blocks
-    from tribo.traces import pieces_of
+    from tribo.traces import carry_load, pieces_of
 
     name, export = (test.test_id, split_choice(test.file)[0]) if test else (None, str(path))
     correction = test.correction if test else UNCORRECTED
     tables = read_blocks(path, columns=columns, correction=correction, name=name, file=test.file if test else None)
     pieces = pieces_of(tables, options)
     every = "*" in choice
-    loaded = dict(zip(pieces, _carry_load([piece for piece, _ in pieces.values()]), strict=True))
+    loaded = dict(zip(pieces, carry_load([piece for piece, _ in pieces.values()]), strict=True))
     meant = [address for address in pieces if is_chosen(address, choice)]
     chosen = [address for address in meant if loaded[address] or not every]
     if not chosen:
@@ -376,19 +375,6 @@ def _goes_on(trace: Trace, before: Trace, piece: Trace) -> bool:
         speeds = speed_level_m_s(before), speed_level_m_s(piece)
         pairs += [speeds] if any(map(math.isfinite, speeds)) else []
     return bool(pairs) and one * other > 0 and all(abs(b - a) <= _DISTURBED * abs(a) for a, b in pairs)
-
-
-def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
-    """Which pieces carry a load for half of their time; all of them where none was recorded."""
-    from tribo.traces import load_of
-
-    loads = np.nan_to_num(np.abs([load_of(piece)[0] for piece in pieces]))
-    recorded = [piece.columns.get("normal_force_N") for piece in pieces]
-    if all(load is not None and np.isfinite(load).all() for load in recorded):
-        usual = np.array([float(np.median(load)) for load in recorded if load is not None])
-        side = np.sign(usual[np.argmax(np.abs(usual))])  # a load cell may show less than nothing before contact
-        loads = np.minimum(loads, side * usual)
-    return [bool(load >= _UNLOADED * loads.max()) for load in loads]
 
 
 def _with_load(test: Test, load: float) -> Test:

@@ -10,4 +10,4 @@ from .features import features_of as features_of
 from .phases import phases_of as phases_of
 from .rules import RULES as RULES, Rule as Rule
 from .sliding import oscillation_of as oscillation_of
-from .zero import load_of as load_of
+from .zero import carry_load as carry_load, load_of as load_of

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tribo.records import FloatArray, Trace
 from tribo.traces.drive import DriveMotion, at_rest_below, drive_of, level_cuts, speed_cuts, stroke_end
@@ -20,7 +19,6 @@ _OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
 _OF_LEVEL = 0.05  # this share of its level,
 _OF_NOISE = 6.0  # and this many times the noise of the difference
 _AT_REST_AS_ROUGH = 0.5  # share of the noise of the other direction below which a force shows a rest and no stroke
-_UNLOADED = 0.02  # share of the largest load below which the bodies do not touch
 _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
 _CLEARLY_APART = 1.25  # ratio of two speeds that the slope of a displacement tells apart
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
@@ -55,20 +53,11 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
         return (trace,)
     stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
     if speed is not None:
-        rubbing = (moving > rest) & _touching(load)
-        slid = [(a, b) for a, b in stretches if np.count_nonzero(rubbing[a:b]) >= MINIMUM_SAMPLES]
+        slid = [(a, b) for a, b in stretches if np.count_nonzero(moving[a:b] > rest) >= MINIMUM_SAMPLES]
         stretches = slid or stretches
     shortest = _FRAGMENT * float(np.median([b - a for a, b in stretches])) if stretches else 0.0
     kept = [(a, b) for a, b in stretches if b - a >= shortest] or [(0, trace.time_s.size)]
     return tuple(piece_of(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
-
-
-def _touching(load: FloatArray | None) -> NDArray[np.bool_] | bool:
-    """The samples with a load between the bodies, which may have either sign; all where none was recorded."""
-    if load is None or not np.isfinite(load).all():
-        return True
-    low, high = np.percentile(load, (5.0, 95.0))
-    return load > _UNLOADED * high if high >= -low else load < _UNLOADED * low
 
 
 def _steps_or_levels(values: FloatArray) -> list[tuple[int, int]]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any, Literal
 
 import numpy as np
@@ -43,7 +44,15 @@ from tribo.traces.sliding import (
     transient_end,
     window_between,
 )
-from tribo.traces.zero import BEFORE_CONTACT, chosen_zero, disagreement_N, load_level, stated_zeros, zero_at_first
+from tribo.traces.zero import (
+    BEFORE_CONTACT,
+    carry_load,
+    chosen_zero,
+    disagreement_N,
+    load_level,
+    stated_zeros,
+    zero_at_first,
+)
 from tribo.zeroing import ZeroChoice
 
 GIVEN = "given"  # the rule of forces that were evaluated elsewhere
@@ -286,8 +295,9 @@ def read_pulls(
 ) -> tuple[Pull, ...]:
     """Read every pull of one record, or of several tables of one (see :func:`pieces_of`).
 
-    A piece that slides from its first sample, after a step of load or speed, has no static peak: its ``static_N`` is
-    NaN and it is flagged ``no_static``. ``test_id`` of a pull is the name of its piece, ``recorded_load_N`` its load.
+    A piece without load is no pull. One that slides from its first sample, after a step of load or speed, has no static
+    peak: its ``static_N`` is NaN and it is flagged ``no_static``. ``test_id`` of a pull is the name of its piece,
+    ``recorded_load_N`` its load.
 
     Parameters
     ----------
@@ -309,7 +319,9 @@ def read_pulls(
     """
     pulls: list[Pull] = []
     problems: list[Problem] = []
-    for piece, options in pieces_of(tables, PullOptions(rule, parameters, test)).values():
+    pieces = list(pieces_of(tables, PullOptions(rule, parameters, test)).values())
+    loaded = carry_load([piece for piece, _ in pieces])
+    for piece, options in compress(pieces, loaded):
         own = replace(options, test=replace(test, test_id=piece.name) if test else None)
         try:
             pulls.append(evaluate(piece, own))

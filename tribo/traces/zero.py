@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from tribo.zeroing import ZeroChoice
 BEFORE_CONTACT = "before contact"
 _FEWEST = 5
 _CERTAIN = 5.0  # two levels agree where they differ by less than this many times their joint uncertainty
+_UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 _UNPULLED = 0.3  # share of the largest force below which a force at a stop tells of the zero
 
 
@@ -139,3 +141,14 @@ def load_of(trace: Trace) -> tuple[float, float]:
         return math.nan, math.nan
     mean_N, u_N, _, _ = steady(trace.time_s, np.abs(load) if float(np.median(load)) > 0 else -load)
     return mean_N, u_N
+
+
+def carry_load(pieces: Sequence[Trace]) -> list[bool]:
+    """Which pieces of an export carry a load for half of their time; all of them where none was recorded."""
+    loads = np.nan_to_num(np.abs([load_of(piece)[0] for piece in pieces]))
+    recorded = [piece.columns.get("normal_force_N") for piece in pieces]
+    if all(load is not None and np.isfinite(load).all() for load in recorded):
+        usual = np.array([float(np.median(load)) for load in recorded if load is not None])
+        side = np.sign(usual[np.argmax(np.abs(usual))])  # a load cell may show less than nothing before contact
+        loads = np.minimum(loads, side * usual)
+    return [bool(load >= _UNLOADED * loads.max()) for load in loads]
