@@ -54,7 +54,8 @@ COLUMNS = {
 OBSERVABLES = {
     "static": "static friction", "sliding": "sliding friction", "both": "friction (static and sliding)",
     "drop": "the drop from static to sliding friction", "rise": "the slope of the rise of the force",
-    "zero": "the force before contact",
+    "zero": "the force before contact", "load": "the recorded normal load", "peak": "the highest recorded force",
+    "turn": "the force when the drive turns back",
 }  # fmt: skip
 
 

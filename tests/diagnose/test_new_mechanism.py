@@ -114,7 +114,7 @@ def test_it_runs_in_the_simulator_by_its_law(toy: Mechanism) -> None:
 
 def test_evidence_that_it_states_in_the_traces_is_read_and_bars_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A mechanism with the force before contact as its evidence is named from that, without a line elsewhere."""
-    stated = TraceEvidence("zero", "", "read from the force before contact", corrected=True)
+    stated = TraceEvidence("zero", "", "read from the force before contact", "zero", corrected="{found}")
     monkeypatch.setitem(MECHANISMS, NAME, replace(TOY, evidence=stated))
     monkeypatch.setitem(MECHANISMS, "load_cell_offset", replace(MECHANISMS["load_cell_offset"], evidence=None))
     v = worded(examine(hidden(("load_cell_offset", 1.0)), replicates=(20, 10)).verdict)

@@ -11,7 +11,7 @@ import numpy as np
 from tribo.diagnostics.candidates import CauseCandidate, Named, judged, refitted, weights_of
 from tribo.diagnostics.column_search import with_repeats
 from tribo.diagnostics.contrasts import Screen
-from tribo.diagnostics.direct_evidence import Evidence, stated_evidence
+from tribo.diagnostics.direct_evidence import OF_ZERO, Evidence, stated_evidence
 from tribo.diagnostics.effect_sizes import misfit_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
 from tribo.diagnostics.inference import (
@@ -113,8 +113,8 @@ def causes_from_evidence(certain: Mapping[str, tuple[Evidence, float]]) -> list[
             e, p = certain[name]
             parameters = {MECHANISMS[name].amplitude.name: Estimate(e.value, *e.interval, e.unit)}
             cause = Cause(name, 1.0, parameters, shows=stated)
-            observable, size = ("rise", 100.0 * e.change) if stated.quantity == "rise" else ("zero", float("nan"))
-            each.append((cause, Misfit(observable, "", stated.covariate, size, p, shows=cause)))
+            size = float("nan") if stated.quantity in OF_ZERO else 100.0 * e.change
+            each.append((cause, Misfit(stated.observable, "", stated.covariate, size, p, shows=cause)))
     return each
 
 
@@ -127,13 +127,13 @@ def exclusions(
         e = evidence.get(name) if m.evidence is not None else None
         why: Why | None = "only in traces" if m.untested else None
         if e is not None and m.evidence is not None and m.evidence.corrected:
-            why = "zero subtracted"
+            why = "corrected"
+        elif e is not None and not e.certain:
+            why = "not certain"
         elif name in absorbed:
             why = absorbed[name]
         elif not m.applies(conditions):
             why = "recorded in part" if _recorded_in_part(m, conditions) else "not varied"
-        elif e is not None and not e.certain:
-            why = "not certain"
         if why is not None:
             shows = _recorded_in_part(m, conditions) if why == "recorded in part" else evidence.get(name)
             excluded.append(Excluded(name, why, shows=shows))
@@ -265,7 +265,7 @@ def conclude(
     outcome = _outcome(named, excess is not None, bool(certain), level)
     shown = _shown(named) if named is not None and outcome in CERTAIN_CAUSES else []
     gained = None
-    zeros = [q for q in (stated_evidence()[name].quantity for name in certain) if q != "rise"]
+    zeros = [q for q in (stated_evidence()[name].quantity for name in certain) if q in OF_ZERO]
     if named is not None and named.causes and outcome != "unknown":
         gained = gain(baseline, model, rng)
     elif outcome == "named" and zeros:

@@ -1,4 +1,5 @@
-"""What records show by themselves: the force before contact, the slope of the rise, running-in, an offset of strokes.
+"""What records show by themselves: the force before contact, the rise, what each pull shows of the machine, running-in,
+an offset of strokes.
 
 Running-in is a difference of friction at the beginning of a slide from that of its second half. Strokes in both
 directions show the offset of the force, which no friction makes.
@@ -32,7 +33,8 @@ LEAST_P = 1e-12  # no estimate has a tail that is known further out
 class Evidence:
     """An estimate with its standard error, and whether it is certain and large enough to matter.
 
-    ``estimates`` is the number of estimates from which this one was chosen.
+    ``estimates`` is the number of estimates from which this one was chosen. ``tolerance`` is what an instrument within
+    its tolerance may add to the value, half the width of a rectangular distribution (GUM 4.3.7).
     """
 
     value: float
@@ -41,11 +43,12 @@ class Evidence:
     unit: str
     change: float = 0.0  # over the whole series, N or relative
     estimates: int = 1
+    tolerance: float = 0.0
 
     @property
     def interval(self) -> tuple[float, float]:
         """Ninety percent."""
-        half = 1.645 * self.standard_error
+        half = 1.645 * float(np.hypot(self.standard_error, self.tolerance / np.sqrt(3.0)))
         return self.value - half, self.value + half
 
     def p_adjusted(self, estimates: int) -> float:
@@ -56,7 +59,10 @@ class Evidence:
 
 def direct_evidence(o: Observations) -> dict[str, Evidence]:
     """What the traces show of every mechanism that states an evidence in them, by name."""
-    each = {name: ESTIMATES[stated.quantity](o) for name, stated in stated_evidence().items()}
+    each = {
+        name: of_each_pull(o, name) if stated.quantity == "each pull" else ESTIMATES[stated.quantity](o)
+        for name, stated in stated_evidence().items()
+    }
     return {name: e for name, e in each.items() if e is not None}
 
 
@@ -140,6 +146,23 @@ def rise_stiffening(o: Observations) -> Evidence | None:
     return Evidence(slope, error, bool(certain), "", slope * float(np.ptp(x)))
 
 
+def of_each_pull(o: Observations, name: str) -> Evidence | None:
+    """The typical amplitude of a mechanism by every pull; certain where it is also large enough, and possible."""
+    stated, amplitude = stated_evidence()[name], MECHANISMS[name].amplitude
+    if stated.of_each is None or stated.change is None or not set(stated.reads) <= set(o.marks):
+        return None
+    values = stated.of_each(o.marks)
+    shown = np.isfinite(values)
+    if shown.sum() < _FEWEST:
+        return None
+    centre, error = _centre(values[shown])
+    changes = stated.change(o.marks, np.full(o.n, centre))[shown]
+    change = float(np.median(changes[np.isfinite(changes)]))
+    certain = abs(centre) > CERTAIN * error and abs(change) > stated.least and amplitude.low <= centre <= amplitude.high
+    within = stated.least * abs(centre / change) if change else 0.0
+    return Evidence(centre, error, bool(certain), amplitude.unit, change, tolerance=within)
+
+
 def _centre(values: FloatArray) -> tuple[float, float]:
     """Median and its standard error."""
     centre = float(np.median(values))
@@ -155,6 +178,7 @@ def _matters_N(o: Observations) -> float:
     return 0.005 * float(np.exp(np.quantile(o.log_force, 0.05)))
 
 
+OF_ZERO = ("zero", "zero drift")
 ESTIMATES: dict[Quantity, Callable[[Observations], Evidence | None]] = {
     "zero": zero_offset,
     "zero drift": zero_drift,
@@ -164,7 +188,7 @@ ESTIMATES: dict[Quantity, Callable[[Observations], Evidence | None]] = {
 
 BLOCKS = 20  # of equal distance; the first is compared with those of the second half
 _FEWEST_IN_BLOCK = 5
-_FEWEST = 3  # pairs of strokes
+_FEWEST = 3  # pairs of strokes, or pulls
 OFFSET = next(m.name for m in MECHANISMS.values() if STROKES_APART in m.without_model)
 
 

@@ -19,7 +19,7 @@ from tribo.display import displayed
 from tribo.errors import FitError, Problem
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.conditions import levels_of, names_in, numbers_in
-from tribo.mechanisms.record import Conditions, StringArray
+from tribo.mechanisms.record import Conditions, Marks, StringArray
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
 from tribo.user_text import is_recorded
 
@@ -53,6 +53,7 @@ class Observations:
     flat: str
     set_aside: tuple[SetAside, ...] = ()
     measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    marks: Marks = field(default_factory=dict)
 
     @property
     def n(self) -> int:
@@ -77,7 +78,8 @@ class Observations:
         gaps = {name: replace(gap, **cut_record(gap)) for name, gap in self.conditions.gaps.items()}  # type: ignore[arg-type]
         own = {**cut_record(self.conditions), "columns": columns, "gaps": gaps}
         conditions = replace(self.conditions, **own)  # type: ignore[arg-type]
-        return replace(self, **{**cut_record(self), "conditions": conditions})  # type: ignore[arg-type]
+        marks = {name: mark[keep] for name, mark in self.marks.items()}
+        return replace(self, **{**cut_record(self), "conditions": conditions, "marks": marks})  # type: ignore[arg-type]
 
 
 def observe(ingested: Ingested) -> Observations:
@@ -110,7 +112,20 @@ def observe(ingested: Ingested) -> Observations:
         flat=campaign.flat_sample or NO_FLAT,
         set_aside=(*ingested.set_aside, *left_out),
         measured=dict(campaign.measured),
+        marks=_marks(ingested, tests, pulls, conditions),
     )
+
+
+def _marks(ingested: Ingested, tests: list[Test], pulls: list[Pull], conditions: Conditions) -> dict[str, FloatArray]:
+    """What the traces show besides the forces, as far as one of them does."""
+    shown = [ingested.features.get(test.test_id, {}) for test in tests]
+    marks = {
+        name: _numbers([found[name].value if name in found else None for found in shown])
+        for name in sorted({name for found in shown for name in found})
+    }
+    marks |= {"clip_N": conditions.clip_N, "static_N": _numbers([pull.static_N for pull in pulls])}
+    stated = _numbers([test.stiffness_N_per_m for test in tests])
+    return marks | ({"stated_stiffness_N_per_m": stated} if np.isfinite(stated).any() else {})
 
 
 def enough(o: Observations) -> Observations:

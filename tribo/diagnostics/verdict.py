@@ -21,7 +21,7 @@ LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "nuisance
 Nuisance = Literal["days", "drift", "specimen_drift"]
 # why a mechanism is not among the causes
 Why = Literal[
-    "zero subtracted", "absorbed", "hidden", "not varied", "not certain", "only in traces", "wrong sign",
+    "corrected", "absorbed", "hidden", "not varied", "not certain", "only in traces", "wrong sign",
     "explains less", "a law explains more", "not printed", "contradicted", "only with the load", "vary together",
     "recorded in part", "nothing left beside a law",
 ]  # fmt: skip

@@ -56,6 +56,7 @@ MECHANISM = Mechanism(
         quantity="rise",
         covariate="speed_mm_s",
         source="read from the slope of the rise",
+        observable="rise",
         absent="the slope of the rise changes by {percent:.1f} % per e-fold of speed, which is no clear effect",
     ),
     in_table=InTable(missing="no trace is printed in numbers"),

@@ -51,7 +51,9 @@ MECHANISM = Mechanism(
         quantity="zero drift",
         covariate="started_at",
         source="read from the force before contact; the zero of each pull was subtracted",
-        corrected=True,
+        observable="zero",
+        corrected="the force before contact changes by {found}; the zero of each pull was subtracted, so it cannot "
+        "explain the friction forces",
         contains=("load_cell_offset",),
     ),
     measurement=DirectMeasurement("Record the unloaded cell every hour for a day.", 2e-4, 1.0),

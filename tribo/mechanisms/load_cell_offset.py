@@ -49,7 +49,9 @@ MECHANISM = Mechanism(
         quantity="zero",
         covariate="",
         source="read from the force before contact; it was subtracted from every force",
-        corrected=True,
+        observable="zero",
+        corrected="the force before contact is {found}; the zero of each pull was subtracted, so it cannot explain the "
+        "friction forces",
     ),
     measurement=DirectMeasurement("Record two seconds of force before contact and after lift-off.", 0.003, 0.5),
     without_model=(STROKES_APART,),

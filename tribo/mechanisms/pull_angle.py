@@ -6,7 +6,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Placement, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    Conditions,
+    Forces,
+    Marks,
+    Mechanism,
+    Placement,
+    TraceEvidence,
+    Values,
+    amplitude,
+)
+from tribo.records import FloatArray
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -27,6 +38,16 @@ def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
     return {"wire_angle_rad": float(values[0])}
 
 
+def of_each(marks: Marks) -> FloatArray:
+    """The angle whose sine is the share of the pull that the recorded normal load loses, rad."""
+    return np.arcsin(np.clip(marks["load_lost_per_pull"], -1.0, 1.0))
+
+
+def change(marks: Marks, angle: FloatArray) -> FloatArray:
+    """Share of the pull that the wire takes off the load."""
+    return np.sin(angle)
+
+
 MECHANISM = Mechanism(
     name="pull_angle",
     kind="instrument",
@@ -38,9 +59,21 @@ MECHANISM = Mechanism(
     enters="measuring chain, and the normal force, because the wire lifts the sled",
     shows="one gain per regime, the same on every sample",
     confused_with="the friction coefficient itself",
-    separates="change the height of the wire",
+    separates="record the normal load below the sample, or change the height of the wire",
     silenced_by=("change the height of the wire",),
     plain="an inclined wire",
     meaning="the wire is inclined, which changes the load on the contact",
     placement=Placement(load=lifted, chain=in_chain, own_friction=True),
+    evidence=TraceEvidence(
+        quantity="each pull",
+        covariate="",
+        source="read from the recorded normal load, which falls in proportion to the pull; a load cell that answers to "
+        "the pull (cross-talk) would look the same, and another height of the wire tells them apart",
+        observable="load",
+        absent="of the pull, {percent:.1f} % is missing from the recorded normal load, which a load cell alone may show",
+        reads=("load_lost_per_pull",),
+        of_each=of_each,
+        change=change,
+        least=0.01,  # cross-talk that makers of cells for two forces allow, of the other force
+    ),
 )

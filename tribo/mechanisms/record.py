@@ -158,7 +158,10 @@ class Placement:
 BY_LAW = Placement(by_law=True)
 
 
-Quantity = Literal["zero", "zero drift", "rise"]
+Quantity = Literal["zero", "zero drift", "rise", "each pull"]
+Marks = Mapping[str, FloatArray]
+"""Of every test, (n,): its features by name, ``static_N``, ``clip_N`` and ``stated_stiffness_N_per_m``, as far as a
+test of the campaign has them; NaN where others have."""
 
 
 @displayed()
@@ -170,25 +173,36 @@ class TraceEvidence:
     ----------
     quantity
         "zero": force before contact, N. "zero drift": its slope in time, N/h. "rise": relative change of the slope
-        of the rise per e-fold of the pull speed.
+        of the rise per e-fold of the pull speed. "each pull": what ``of_each`` reads.
     covariate
         The recorded column that it follows, empty where it is constant.
     source
         Where the value was read, as a clause of a sentence.
+    observable
+        What a misfit of it is called, by :data:`tribo.vocabulary.OBSERVABLES`.
     absent
         The sentence where the evidence is not certain, with ``{value}`` and ``{percent}``.
     corrected
-        Whether the effect was subtracted from every force, so that it cannot explain the friction forces.
+        Where the effect does not act on the forces as they were read: the sentence that says so, with ``{found}`` (the
+        amplitude with its uncertainty) and ``{percent}``.
     contains
         Mechanisms whose evidence this one includes.
+    reads, of_each, change, least
+        The marks that it needs; the amplitude by every pull, (n,), NaN where it shows none; the change of what it acts
+        on at that amplitude, as a share, (n,); the share below which it does not matter.
     """
 
     quantity: Quantity
     covariate: str
     source: str
+    observable: str
     absent: str = ""
-    corrected: bool = False
+    corrected: str = ""
     contains: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    of_each: Callable[[Marks], FloatArray] | None = None
+    change: Callable[[Marks, FloatArray], FloatArray] | None = None
+    least: float = 0.0
 
 
 @displayed()

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from tribo.records import FloatArray, Trace
-from tribo.traces.drive import DriveMotion, at_rest_below, drive_of, level_cuts, speed_cuts, stroke_end
+from tribo.traces.drive import DriveMotion, at_rest_below, drive_of, level_cuts, load_as_set, speed_cuts, stroke_end
 from tribo.traces.signal import MINIMUM_SAMPLES, median_of_three, running_mean, runs_of, sample_noise, wander
 
 _AT_REST = 0.05  # share of the usual speed below which the drive stands still
@@ -40,7 +40,7 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
     speed = trace.columns.get("speed_m_s", trace.columns.get("rotation_rev_per_s"))
     find = steps if cuts else _steps_or_levels
     if load is not None and np.isfinite(load).all():
-        cuts += find(load)
+        cuts += find(load_as_set(load, trace.force_N))
     speed = speed if speed is not None and np.isfinite(speed).all() else None
     if speed is not None:
         moving = np.abs(speed)

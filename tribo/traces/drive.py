@@ -30,6 +30,8 @@ Mask = NDArray[np.bool_]
 Range = tuple[int, int]
 
 FEWEST_AT_REST = 5
+_PROPORTIONAL = 0.8  # share of the variance of a load that follows the pull where it changes because of it
+_OF_FRICTION = 0.3  # share of what a load changes for a newton of pull where friction is in proportion to it
 _AT_REST = 0.05  # share of the lowest level of the speed below which the drive stands still
 _BINS = 10  # of the speed in a decade, where its levels are looked for
 _OCCUPIED = 0.01  # share of the samples in one bin from which on a speed is a level and not passed through
@@ -321,6 +323,22 @@ def levels_of(values: FloatArray) -> list[tuple[int, int, float]]:
         else:
             levels.append((a, b, mean))
     return levels
+
+
+def load_as_set(load: FloatArray, force: FloatArray) -> FloatArray:
+    """The amount of a recorded normal load (n,) without what follows the pull (n,): a wire that rises takes load off,
+    and a load cell may answer to the pull.
+
+    A load that was changed takes the friction with it: by about as large a share, and never the other way.
+    """
+    amount, pull = np.abs(load), force - force.mean()
+    away = amount - amount.mean()
+    product, spread = float(away @ pull), float(pull @ pull)
+    if product**2 <= _PROPORTIONAL * spread * float(away @ away):
+        return amount
+    if product > _OF_FRICTION * spread * float(amount.mean()) / max(float(np.median(np.abs(force))), 1e-300):
+        return amount
+    return np.asarray(amount - product / spread * pull)
 
 
 def level_cuts(values: FloatArray) -> list[Range]:

@@ -51,6 +51,11 @@ FEATURES = {
     "roughness": "standard deviation of the sliding force over its mean",
     "main_frequency_Hz": "frequency of the highest peak of the spectrum of the sliding force",
     "main_share": "share of the variance of the sliding force within 20 % of that frequency",
+    "load_lost_per_pull": "fall of the recorded normal load for each newton of the pull, from rest to the end of the "
+    "slide",
+    "missed_peak_N": "what the highest data point of a sharp peak misses on average: half of r d / (r + d), r the "
+    "larger of the two steps before it and d the fall over the two steps after it",
+    "force_kept_at_turn": "force from which the unloading goes on after the drive has turned back, over that before it",
 }
 _LOWER, _UPPER = (0.2, 0.6), (0.6, 0.9)  # shares of the static peak between which the slopes of the rise are read
 _WIDTH_AT = 0.1  # share of the static drop below the peak at which its width is taken
@@ -64,6 +69,9 @@ _BLOCKS = 16
 _CONVERGED = 1e-13  # relative: every processor comes to the same printed digits
 _NEAR = 0.2  # share of the main frequency within which variance belongs to it
 _NORMAL = 1.959964
+_LOADED = 0.5  # share of the load while sliding below which a body is not yet loaded at rest
+_BEFORE_TURN = 0.02  # share of the way slid over which the force before a turn is taken
+_UNLOADING = (0.2, 0.6)  # shares of the force before a turn between which the line of the unloading is read
 
 
 def features_of(trace: Trace, pull: Pull, speed_m_s: float | None = None) -> dict[str, Feature]:
@@ -103,6 +111,7 @@ def features_of(trace: Trace, pull: Pull, speed_m_s: float | None = None) -> dic
             pull = _with_highest(time, force, pull)
             tau = _correlation_while_sliding(time, force, pull)
             found |= _of_rise(time, force, pull, speed, tau) | _of_decay(time, force, pull, speed, tau)
+            found |= _of_machine(trace, time, force, pull)
     with suppress(ZeroDivisionError):
         found |= _of_slips(pull.slips) | _of_sliding(time, force, pull)
     return {name: found[name] for name in FEATURES if name in found and math.isfinite(found[name].value)}
@@ -291,6 +300,51 @@ def _decay_fit(
         return None  # no decay: its length is without bound, and rounding decides
     u = np.sqrt(variance)
     return abs(float(best[0])), float(u[0]), float(best[1]), float(u[1]), float(best[2])
+
+
+def _of_machine(trace: Trace, time: FloatArray, force: FloatArray, pull: Pull) -> dict[str, Feature]:
+    """What machine and recorder leave in a pull: a load that falls with it, a missed peak, a turn of the drive."""
+    end_s = pull.window_s[1] if math.isfinite(pull.window_s[1]) else float(time[-1])
+    first, last = (int(k) for k in np.searchsorted(time, (pull.onset_s, end_s)))
+    found = {}
+    if last - first >= _FEWEST:
+        top = first + int(np.argmax(force[first:last]))
+        before, after = force[max(top - 2, 0) : top + 1], force[top : top + 3]
+        if before.size == after.size == 3:
+            up, down = float(np.diff(before).max()), float(after[0] - after.min())
+            missed = 0.5 * up * down / (up + down)
+            noise = sample_noise(force) * math.hypot(down**2, up**2) / (up + down) ** 2
+            found["missed_peak_N"] = _normal(missed, math.hypot(noise, missed / math.sqrt(3.0)), 5)
+    load = trace.columns.get("normal_force_N")
+    rest = int(np.searchsorted(time, 2.0 * pull.onset_s - pull.peak_s))  # as long as the rise
+    if load is not None and last - rest >= 2 * _FEWEST and np.ptp(load) > 0:
+        carried = np.abs(np.interp(time[rest:last], trace.time_s, load))
+        if carried[: first - rest + 1].min() > _LOADED * float(np.median(carried)):
+            slope, u = _slope(force[rest:last], carried)
+            found["load_lost_per_pull"] = _normal(-slope, u, last - rest)
+    if trace.displacement_m is not None:
+        found |= _of_turn(np.interp(time, trace.time_s, trace.displacement_m), force, last)
+    return found
+
+
+def _of_turn(drive_m: FloatArray, force: FloatArray, last: int) -> dict[str, Feature]:
+    """How much of the force is left where the line of the unloading begins; nothing where the drive does not turn."""
+    forward = drive_m if drive_m[last - 1] >= drive_m[0] else -drive_m
+    turn = int(np.argmax(forward))
+    back = forward[turn] - forward[turn:]
+    slid = (forward > forward[turn] - _BEFORE_TURN * (forward[turn] - forward[0])) & (np.arange(forward.size) <= turn)
+    before = float(np.median(force[slid]))
+    below = np.flatnonzero(force[turn:] < _UNLOADING[0] * before)
+    end = int(below[0]) if below.size else back.size
+    inside = np.flatnonzero(force[turn : turn + end] < _UNLOADING[1] * before)
+    if before <= 0 or inside.size < _FEWEST or not below.size:
+        return {}
+    way, unloading = back[inside[0] : end], force[turn + inside[0] : turn + end]
+    slope, middle, mean = line(way, unloading)
+    _, slope_u = _slope(way, unloading)
+    level_u = slope_u * float(np.std(way))
+    kept = (mean - slope * middle) / before
+    return {"force_kept_at_turn": _normal(kept, math.hypot(slope_u * middle, level_u) / before, int(way.size))}
 
 
 def _of_slips(slips: Sequence[Slip]) -> dict[str, Feature]:

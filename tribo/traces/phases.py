@@ -27,6 +27,7 @@ from tribo.traces.drive import (
     level_cuts,
     level_of,
     levels_of,
+    load_as_set,
     quiet_end,
     relaxes_from,
     speed_cuts,
@@ -247,7 +248,8 @@ def _contact(load: FloatArray | None, samples: int) -> Range:
 def _over_load(trace: Trace, signal: Signal, contact: Range) -> Signal:
     """A signal whose force is that over the load where that goes from one level to another within a contact."""
     load = trace.columns.get("normal_force_N")
-    if load is None or not np.isfinite(load).all() or not level_cuts(np.abs(load[contact[0] : contact[1]])):
+    part = slice(*contact)
+    if load is None or not np.isfinite(load).all() or not level_cuts(load_as_set(load[part], trace.force_N[part])):
         return signal
     usual = float(np.median(np.abs(load[contact[0] : contact[1]])))
     share = usual / np.maximum(median_of_three(np.abs(load)), 0.1 * usual) if usual > 0 else 1.0
@@ -622,7 +624,8 @@ def _motion(
     cuts, load = [], trace.columns.get("normal_force_N")
     moving = first + int(np.argmax(drive.moving[first:last])) if drive is not None and last > first else first
     if load is not None and np.isfinite(load[moving:last]).all():
-        cuts += [(moving + a, moving + b, "step of load") for a, b in level_cuts(np.abs(load[moving:last]))]
+        levels = level_cuts(load_as_set(load[moving:last], trace.force_N[moving:last]))
+        cuts += [(moving + a, moving + b, "step of load") for a, b in levels]
     if drive is not None and np.isfinite(drive.pace[moving:last]).all():
         cuts += [(a, max(b, a + 1), "step of speed") for a, b in speed_cuts(trace, drive, (moving, last))]
     cuts.sort()

@@ -353,15 +353,13 @@ def why_not(e: Excluded) -> str:
     if isinstance(e.shows, str):
         return not_varied([e.shows])
     m = MECHANISMS[e.mechanism.partition(":")[0]]
-    if e.why == "zero subtracted" and isinstance(e.shows, Evidence) and m.evidence is not None:
-        changes = "changes by" if m.evidence.quantity == "zero drift" else "is"
-        return (
-            f"the force before contact {changes} {with_uncertainty(e.shows.value, e.shows.standard_error)} "
-            f"{e.shows.unit}; "
-            "the zero of each pull was subtracted, so it cannot explain the friction forces"
-        )
-    if e.why == "not certain" and isinstance(e.shows, Evidence) and m.evidence is not None:
-        return m.evidence.absent.format(value=e.shows.value, percent=100.0 * e.shows.value)
+    if isinstance(e.shows, Evidence) and m.evidence is not None:
+        found = f"{with_uncertainty(e.shows.value, e.shows.standard_error)} {e.shows.unit}".rstrip()
+        percent = 100.0 * (e.shows.change if m.evidence.quantity == "each pull" else e.shows.value)
+        if e.why == "corrected":
+            return m.evidence.corrected.format(found=found, percent=percent)
+        if e.why == "not certain":
+            return m.evidence.absent.format(value=e.shows.value, percent=percent)
     if e.why == "wrong sign" and isinstance(e.shows, float):
         most = f"at most {m.amplitude.name} = {e.shows:.2g} {m.amplitude.unit}".rstrip()
         return f"wrong sign: it can change friction in one direction only; {most} (95 %)"
