@@ -70,7 +70,7 @@ MECHANISM = Mechanism(
         source="read from the recorded normal load, which falls in proportion to the pull; a load cell that answers to "
         "the pull (cross-talk) would look the same, and another height of the wire tells them apart",
         observable="load",
-        absent="of the pull, {percent:.1f} % is missing from the recorded normal load, which a load cell alone may show",
+        absent="{percent:.1f} % of the pull is missing from the recorded normal load, which a load cell alone may show",
         reads=("load_lost_per_pull",),
         of_each=of_each,
         change=change,
