@@ -66,7 +66,7 @@ def test_records_without_a_mark_leave_their_mechanism_untested(tmp_path: Path) -
 
 def test_a_load_that_falls_because_of_the_pull_cuts_no_record() -> None:
     time = np.arange(1200) / 100.0
-    force = np.where(time < 3.0, 0.0, np.minimum(2.0 * (time - 3.0), 4.0))
+    force = np.where(time < 3.0, 0.0, np.minimum(20.0 * (time - 3.0), 4.0))
     noise = 0.002 * np.random.default_rng(3).standard_normal((2, 1200))
     record = Trace("r", time, force + noise[0], columns={"normal_force_N": 1.0 - 0.05 * force + noise[1]})
     assert len(split_pulls(record)) == 1
