@@ -372,8 +372,19 @@ def humidity(w: Written, text: str, context: dict[str, str]) -> str:
     return w.equal("humidity", text, text if near else f"{low:g} to {high:g} %")
 
 
+def missed_peaks(w: Written, text: str, context: dict[str, str]) -> str:
+    """How far the highest data point lies below the peak: the median over the tests."""
+    found = re.search(r"the highest data point lies ([\d.]+) % below the peak on average", text)
+    if found is None:
+        return text
+    features = w.table("features")
+    missed = features[features["feature"] == "missed_peak_N"].set_index("test_id")["value"].astype(float)
+    static = w.used.set_index("test_id")["static_N"].astype(float)
+    return w.equal("missed peaks", found[1], f"{100 * (missed / static).median():.1f}")
+
+
 CHECKS: tuple[Callable[[Written, str, dict[str, str]], str], ...] = (
-    agreement, of_layers, of_models, detectable, budget, of_laws, humidity,
+    agreement, of_layers, of_models, detectable, budget, of_laws, humidity, missed_peaks,
 )  # fmt: skip
 
 

@@ -37,7 +37,7 @@ def of_each(marks: Marks) -> FloatArray:
 
 def change(marks: Marks, share: FloatArray) -> FloatArray:
     """Share of the static peak that the highest data point misses."""
-    return share * marks["clip_N"] / marks["static_N"]
+    return marks["missed_peak_N"] / marks["static_N"]
 
 
 def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
