@@ -115,7 +115,19 @@ def _stamps(n: int) -> list[str]:
 
 def write(bench: Bench, folder: Path, seed: int) -> Path:
     """The campaign on disk: campaign.toml, tests.csv and one export a pull, in the style of a tensile machine."""
+    write_tables(bench, folder, seed)
     rng = np.random.default_rng(seed + 1_000_003)
+    for k, test in enumerate(bench.tests.itertuples()):
+        time, force = _trace(bench, k, float(test.speed_mm_s), rng)
+        head = f'"Specimen label","{test.test_id}"\n\n"Time","Extension","Load"\n"(s)","(mm)","(N)"\n'
+        rows = np.column_stack([time, time * float(test.speed_mm_s), force])
+        body = ('"%.4f","%.5f","%.5f"\n' * len(rows)) % tuple(rows.ravel().tolist())
+        (folder / "raw" / f"{test.test_id}.csv").write_text(head + body)
+    return folder
+
+
+def write_tables(bench: Bench, folder: Path, seed: int) -> None:
+    """campaign.toml, tests.csv and the folder for the exports that tests.csv names."""
     (folder / "raw").mkdir(parents=True)
     head = f'[campaign]\ntitle = "hidden {seed}"\nnominal_area_mm2 = {AREA_MM2}\n'
     head += "slider_mass_g = 1.5\npull_speed_mm_s = 0.2\n"
@@ -124,13 +136,6 @@ def write(bench: Bench, folder: Path, seed: int) -> Path:
     table = bench.tests.drop(columns=["true_sample", "N"])
     table.insert(1, "file", [f"raw/{t}.csv" for t in table["test_id"]])
     table.to_csv(folder / "tests.csv", index=False)
-    for k, test in enumerate(bench.tests.itertuples()):
-        time, force = _trace(bench, k, float(test.speed_mm_s), rng)
-        head = f'"Specimen label","{test.test_id}"\n\n"Time","Extension","Load"\n"(s)","(mm)","(N)"\n'
-        rows = np.column_stack([time, time * float(test.speed_mm_s), force])
-        body = ('"%.4f","%.5f","%.5f"\n' * len(rows)) % tuple(rows.ravel().tolist())
-        (folder / "raw" / f"{test.test_id}.csv").write_text(head + body)
-    return folder
 
 
 def _pattern(name: str) -> str:

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from blind.bench import AREA_MM2, Bench, Design
-from blind.tribometer import hide, write
+from blind.bench import Bench, Design
+from blind.tribometer import hide, write_tables
 
 LABEL_N_PER_MM = 6.0  # of the spring, as tests.csv states it
 SAMPLE_N_PER_MM = 190.0
@@ -94,7 +94,7 @@ def campaign(folder: Path, seed: int, effect: str = "", size: float = 0.0, desig
     )  # fmt: skip
     lift(bench, machine.angle)
     bench.tests["stiffness_N_per_m"] = LABEL_N_PER_MM * 1e3
-    write(bench, folder, seed)
+    write_tables(bench, folder, seed)
     for k, test in enumerate(bench.tests.itertuples()):
         rows = trace(bench, k, float(test.speed_mm_s), machine, drawn, rng)
         head = f'"Specimen label","{test.test_id}"\n\n"Time","Extension","Load","Normal force"\n'
@@ -155,6 +155,3 @@ def _forward(
     rounded = np.sqrt(beyond**2 + drawn.rounded_mm**2) - drawn.rounded_mm
     fall = sliding + (static - sliding) * np.exp(-rounded / DECAY_MM)
     return np.where(way_mm <= top_mm, rise, fall + 0.008 * sliding * np.sin(beyond / 0.021) * (1 - np.exp(-beyond)))
-
-
-__all__ = ["AREA_MM2", "DESIGN", "EFFECTS", "Machine", "campaign", "seen_in_nine_of_ten"]

@@ -11,6 +11,7 @@ import pytest
 import tribo
 from tribo.diagnostics.direct_evidence import direct_evidence
 from tribo.diagnostics.observations import observe
+from tribo.figures.evidence import power_numbers
 from tribo.records import Ingested, Trace
 from tribo.traces import split_pulls
 from tribo.traces.drive import load_as_set
@@ -40,8 +41,10 @@ def test_the_traces_show_an_effect_of_the_machine_alone_with_its_size(
 @pytest.mark.slow
 @HIDDEN
 def test_an_effect_of_the_machine_is_named_alone(tmp_path: Path, effect: str, times: float) -> None:
-    verdict = tribo.diagnose(read(tmp_path, effect, times), seed=1).verdict
-    assert [c.mechanism for c in verdict.causes] == [effect]
+    diagnosis = tribo.diagnose(read(tmp_path, effect, times), seed=1)
+    assert [c.mechanism for c in diagnosis.verdict.causes] == [effect]
+    power = power_numbers(diagnosis)
+    assert power.loc[power["mark"] == "answer", "name"].item() == "traces: yes, else: no"
 
 
 def test_without_a_hidden_effect_every_mark_is_said_not_to_matter(tmp_path: Path) -> None:

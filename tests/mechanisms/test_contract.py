@@ -7,6 +7,7 @@ import pytest
 
 from tribo.mechanisms import MECHANISMS, NAMES, mechanism
 from tribo.mechanisms.record import Base, Conditions, Mechanism, Values
+from tribo.vocabulary import OBSERVABLES
 
 LAWS = {"F": (4.8, 1.29, 2.9, 0.62), "B": (4.2, 0.59, 3.0, 0.38), "Sx": (3.7, 0.69, 2.95, 0.47)}
 ALL = pytest.mark.parametrize("m", MECHANISMS.values(), ids=list(MECHANISMS))
@@ -134,6 +135,12 @@ def test_it_has_a_plain_name_of_its_own_and_no_identifier_in_its_words(m: Mechan
     assert [other.name for other in MECHANISMS.values() if other.plain == m.plain] == [m.name]
     words = (m.plain, m.shows, m.confused_with, m.separates, m.enters, m.untested, m.in_table.missing)
     assert not any("_" in text for text in (*words, m.in_table.barred, *m.silenced_by))
+
+
+@ALL
+def test_what_the_traces_show_of_it_has_words(m: Mechanism) -> None:
+    assert m.evidence is None or (m.evidence.observable in OBSERVABLES and m.evidence.source)
+    assert m.evidence is None or m.evidence.absent or m.evidence.corrected
 
 
 @ALL

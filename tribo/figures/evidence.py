@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from tribo.diagnostics.direct_evidence import stated_evidence
 from tribo.figures import style
 from tribo.figures.misfit import mechanism_label, pattern_differences
 from tribo.records import FloatArray
@@ -140,7 +141,6 @@ POWER_COLUMNS = ["mark", "name", "strength", "found_10_percent", "found_50_perce
 LEVEL = 0.01  # chance of a misfit where nothing is hidden, as the diagnosis takes it by default
 TENTH = 1.2816  # standard normal deviate exceeded one time in ten
 SHOWN = 16
-OF_TRACES = ("zero", "rise")  # observables of a misfit that no force shows
 POWER_FRAME_MM = 26.0
 
 
@@ -181,9 +181,10 @@ def _needed(d: Diagnosis, level: float) -> float:
 def _answer(d: Diagnosis, level: float) -> str:
     """Whether a deviation of the picture is a misfit; before it, what else the verdict rests on."""
     strongest = "yes" if d.screened.p.min() < level else "no"
+    of_traces = {stated.observable for stated in stated_evidence().values()}
     beside = {
         "means": bool(pattern_differences(d)),
-        "traces": any(m.observable in OF_TRACES for m in d.verdict.misfits),
+        "traces": any(m.observable in of_traces for m in d.verdict.misfits),
         "law": any(layer.kind == "law" for layer in d.verdict.layers),
     }
     said = [f"{name}: yes" for name, there in beside.items() if there]

@@ -310,8 +310,8 @@ def _of_machine(trace: Trace, time: FloatArray, force: FloatArray, pull: Pull) -
     if last - first >= _FEWEST:
         top = first + int(np.argmax(force[first:last]))
         before, after = force[max(top - 2, 0) : top + 1], force[top : top + 3]
-        if before.size == after.size == 3:
-            up, down = float(np.diff(before).max()), float(after[0] - after.min())
+        if before.size == after.size == 3 and (up := float(np.diff(before).max())) > 0:
+            down = float(after[0] - after.min())
             missed = 0.5 * up * down / (up + down)
             noise = sample_noise(force) * math.hypot(down**2, up**2) / (up + down) ** 2
             found["missed_peak_N"] = _normal(missed, math.hypot(noise, missed / math.sqrt(3.0)), 5)
@@ -340,11 +340,9 @@ def _of_turn(drive_m: FloatArray, force: FloatArray, last: int) -> dict[str, Fea
     if before <= 0 or inside.size < _FEWEST or not below.size:
         return {}
     way, unloading = back[inside[0] : end], force[turn + inside[0] : turn + end]
-    slope, middle, mean = line(way, unloading)
-    _, slope_u = _slope(way, unloading)
-    level_u = slope_u * float(np.std(way))
-    kept = (mean - slope * middle) / before
-    return {"force_kept_at_turn": _normal(kept, math.hypot(slope_u * middle, level_u) / before, int(way.size))}
+    slope, slope_u = _slope(way, unloading)
+    kept, reach = (float(unloading.mean()) - slope * float(way.mean())) / before, math.hypot(way.mean(), way.std())
+    return {"force_kept_at_turn": _normal(kept, slope_u * reach / before, int(way.size))}
 
 
 def _of_slips(slips: Sequence[Slip]) -> dict[str, Feature]:
