@@ -306,7 +306,9 @@ _AFTER, _BEFORE = 30.0, 15.0  # characteristic slips that are kept of a record a
 _FEWEST = 40  # samples of a stretch
 _FROM_DIRECT = (0.05, 0.2, 0.8)  # starts: characteristic slip as a share of the slip after the step, in steps of four
 _STIFFEST = 5.0  # logarithm of the largest stiffness over its start: far beyond, a machine is rigid and steps tiny
+_MOST_STEPS = 100  # of the integration from one sample to the next, on average: no friction that a record shows needs them
 _UNTOLD_SD = math.log(10.0) / (2 * 1.96)  # of a logarithm: the 95 % interval is a factor of ten wide
+_UNRESOLVED = 10.0  # answers of the machine, a / (k v) each, or characteristic slips from one sample to the next
 
 
 def fit_steps(
@@ -405,19 +407,25 @@ def _near_steps(
 
 
 def _model(time: FloatArray, drive: Drive, law: str, stiffness_per_m: float) -> Filter:
-    """Friction at the times by mu0, drift, a, b, ln Dc and, where it is not known, ln stiffness; NaN if impossible."""
+    """Friction at the times by mu0, drift, a, b, ln Dc and, where it is not known, ln stiffness; NaN if impossible.
+
+    A machine that answers many times between two samples is rigid to the record, and a state that is renewed as often
+    is always a steady one. Stiffer machines and shorter slips are followed as these: nothing in the record tells them
+    apart, and the steps of the integration would be as short as they are.
+    """
     knots, speeds = np.array(drive.knots_s), np.array(drive.speeds_m_s)
     v0 = float(speeds[0])
+    slip = float(speeds[speeds > 0].min() * np.median(np.diff(time)))
     place = drive.position_m(time)
     place = (place - place.mean()) / np.ptp(place)
     out = np.empty((2, time.size))
 
     def friction(p: FloatArray) -> FloatArray:
-        stiffness = stiffness_per_m if p.size < 6 else math.exp(p[5])
+        stiffness = min(stiffness_per_m if p.size < 6 else math.exp(p[5]), _UNRESOLVED * p[2] / slip)
         parameters = np.array([p[0], v0, p[2], stiffness])
         possible = p[2] > 0.0 and integrated(
-            np.array([p[0], 0.0]), time, knots, speeds, parameters, p[3:4], np.exp(p[4:5]), law == "dieterich",
-            _TOLERANCE, WEIGHTS, out,
+            np.array([p[0], 0.0]), time, knots, speeds, parameters, p[3:4], np.exp(p[4:5]).clip(slip / _UNRESOLVED), law == "dieterich",
+            _TOLERANCE, _MOST_STEPS * time.size, WEIGHTS, out,
         )  # fmt: skip
         return out[0] + p[1] * place if possible else np.full(time.size, np.nan)
 

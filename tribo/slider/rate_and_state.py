@@ -49,7 +49,8 @@ def friction_path(
         speeds, knots = np.array(drive.speeds_m_s), np.array(drive.knots_s)
         stiffness = machine.stiffness_N_per_m / contact.normal_load_N
         parameters = np.array([contact.mu0, contact.v0_m_s, contact.a, stiffness])
-        if not integrated(start, times_s, knots, speeds, parameters, b, Dc, contact.ageing, TOLERANCE, WEIGHTS, solved):
+        rules = (contact.ageing, TOLERANCE, _MOST_STEPS, WEIGHTS)
+        if not integrated(start, times_s, knots, speeds, parameters, b, Dc, *rules, solved):
             what = "without inertia the slider becomes infinitely fast: the machine is too soft for steady sliding"
             raise SimulationError(Problem("not_integrated", what, column="mass_kg", found="0", allowed="above 0"))
     mu, phi = solved[0], solved[1:]
@@ -73,9 +74,11 @@ WEIGHTS[7] = [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, 
 @compiled
 def integrated(
     start: FloatArray, times_s: FloatArray, knots_s: FloatArray, speeds_m_s: FloatArray, parameters: FloatArray,
-    b: FloatArray, Dc_m: FloatArray, ageing: bool, tolerance: float, weights: FloatArray, out: FloatArray,
+    b: FloatArray, Dc_m: FloatArray, ageing: bool, tolerance: float, most_steps: int, weights: FloatArray,
+    out: FloatArray,
 ) -> bool:  # fmt: skip
-    """Friction coefficient and ln(v0 theta / Dc) at the given times, without inertia; False where a step vanishes.
+    """Friction coefficient and ln(v0 theta / Dc) at the given times, without inertia; False where a step vanishes or too many are
+    needed.
 
     Steps end at every time that is asked for and at every knot of the drive. ``parameters`` are mu0, v0, a and
     stiffness over load.
@@ -132,7 +135,7 @@ def integrated(
             lost += 1
             steps += 1
             step = h * (0.5 if not np.isfinite(error) else max(0.2, 0.9 * error**-0.2))
-            if lost > _MOST_LOST or steps > _MOST_STEPS or t + step == t:
+            if lost > _MOST_LOST or steps > most_steps or t + step == t:
                 return False
             continue
         lost = 0
