@@ -165,8 +165,8 @@ def mass_of(record: Record) -> float:
     if record.stiffness_N_per_m > STICKS_BELOW_N_PER_M:
         return math.nan
     late = slice(record.time_s.size // 10, None)
-    law = fit_slips(record.time_s[late], record.friction[late] * LOAD_N, "coulomb", LOAD_N, record.speed_m_s)
-    assert law is not None
+    slipping = record.time_s[late], record.friction[late] * LOAD_N
+    (law,) = fit_slips(*slipping, ["coulomb"], LOAD_N, record.speed_m_s)
     mass = law["mass_kg"]
     print(
         f"{record.name}: mass {mass.value:.4f} kg ({mass.low:.4f} to {mass.high:.4f}) by {law.samples} slips",

@@ -32,9 +32,9 @@ from tribo.tracelaws import (
     STEP_LAWS,
     chosen_slip_laws,
     chosen_step_laws,
-    fit_laws,
     fit_slips,
     fit_speeds,
+    fit_steps,
 )
 
 TRUTHS = ("coulomb", "ageing", "dieterich", "ruina", "stribeck", "viscous", "constant", "logarithmic")
@@ -114,8 +114,8 @@ def examined(truth: str, number: int) -> dict:
     began = time.process_time()
     if truth in SLIP_LAWS:
         (t, force), known, (load, speed) = slip_record(rng, truth)
-        made = [fit_slips(t, force, law, load, speed) for law in SLIP_LAWS]
-        if made[0] is None:
+        made = fit_slips(t, force, SLIP_LAWS, load, speed)
+        if not made:
             return {"truth": truth, "number": number, "chosen": []}
         chosen = [law.law for law in chosen_slip_laws(made)]
     elif truth in SPEED_LAWS:
@@ -125,7 +125,7 @@ def examined(truth: str, number: int) -> dict:
     else:
         (t, mu), known, (drive, noise) = step_record(rng, truth)
         known["noise"] = noise
-        made = fit_laws(t, mu, drive, STEP_LAWS)
+        made = fit_steps(t, mu, STEP_LAWS, drive)
         chosen = [law.law for law in chosen_step_laws(made)]
     own = next(law for law in made if law.law == truth)
     rows = {p.name: [known[p.name], p.value, p.low, p.high, bool(p.told)] for p in own.parameters if p.name in known}

@@ -34,10 +34,10 @@ _LIKELIER = 3.0  # log likelihood by which one of two laws must be better: a rat
 
 
 def fit_slips(
-    time_s: FloatArray, force_N: FloatArray, law: str, normal_load_N: float, speed_m_s: float,
+    time_s: FloatArray, force_N: FloatArray, laws: Sequence[str], normal_load_N: float, speed_m_s: float,
     slips: Sequence[Slip] | None = None,
-) -> TraceLaw | None:  # fmt: skip
-    """Friction law and machine from the slips of a record of stick-slip at constant speed; None with too few slips.
+) -> list[TraceLaw]:  # fmt: skip
+    """Friction laws and machine from the slips of a record of stick-slip at constant speed; none with too few slips.
 
     Between slips the force rises at k v. Within a slip it follows the damped oscillation of a slider under Coulomb
     friction; each slip gives its own static and sliding friction, mass and damping. Over the slips each is normal, with
@@ -49,8 +49,8 @@ def fit_slips(
     ----------
     time_s, force_N
         The record, shape (n,), in s and N.
-    law : "coulomb" or "ageing"
-        The law.
+    laws : sequence of "coulomb" and "ageing"
+        The laws; each slip is fitted once for all of them.
     normal_load_N, speed_m_s
         Normal load and speed of the drive.
     slips
@@ -58,18 +58,17 @@ def fit_slips(
 
     Returns
     -------
-    TraceLaw
-        mu_s, mu_d, stiffness_N_per_m, mass_kg, damping_N_s_per_m (and b) with 95 % intervals. Where the record has too
-        few samples in a slip, mass and damping cannot be told, and sliding friction lies between the trough (a slip
-        that is stopped by damping) and the middle of peak and trough (one without).
+    list of TraceLaw
+        Of every law mu_s, mu_d, stiffness_N_per_m, mass_kg, damping_N_s_per_m (and b) with 95 % intervals. Where the
+        record has too few samples in a slip, mass and damping cannot be told, and sliding friction lies between the
+        trough (a slip that is stopped by damping) and the middle of peak and trough (one without).
     """
     time, force = np.asarray(time_s, float), np.asarray(force_N, float)
     found = _of_every_slip(time, force, slips_of(time, force, speed_m_s=speed_m_s) if slips is None else slips)
     if found is None:
-        return None
+        return []
     peak, trough, slope, stuck, before, shapes = found
-    stiffness = _mean("stiffness_N_per_m", slope / speed_m_s, "N/m")
-    rows = [stiffness]
+    rows = [_mean("stiffness_N_per_m", slope / speed_m_s, "N/m")]
     if shapes.shape[0] >= FEWEST_SLIPS:
         static, sliding, omega, gamma = shapes.T
         mass = slope[: omega.size].mean() / speed_m_s / omega**2
@@ -83,12 +82,13 @@ def fit_slips(
         for name, unit in (("mass_kg", "kg"), ("damping_N_s_per_m", "N s/m")):
             rows.append(TraceLawParameter(name, math.nan, 0.0, math.inf, unit, False))
         held = _mean("mu_s", peak / normal_load_N, "1")
-    scores = _scores(before, slope, stuck, law)
-    if law == "ageing":
-        rows = [*_ageing(before, slope, stuck, normal_load_N, peak.mean() - trough.mean()), *rows]
-    else:
-        rows = [held, *rows]
-    return TraceLaw(law, tuple(rows), float(scores.sum()), peak.size, "slips", tuple(scores))
+    made = []
+    for law in laws:
+        grown = law == "ageing"
+        static = _ageing(before, slope, stuck, normal_load_N, peak.mean() - trough.mean()) if grown else [held]
+        scores = _scores(before, slope, stuck, law)
+        made.append(TraceLaw(law, (*static, *rows), float(scores.sum()), peak.size, "slips", tuple(scores)))
+    return made
 
 
 def _of_every_slip(
@@ -306,14 +306,14 @@ _AFTER, _BEFORE = 30.0, 15.0  # characteristic slips that are kept of a record a
 _FEWEST = 40  # samples of a stretch
 _FROM_DIRECT = (0.05, 0.2, 0.8)  # starts: characteristic slip as a share of the slip after the step, in steps of four
 _STIFFEST = 5.0  # logarithm of the largest stiffness over its start: far beyond, a machine is rigid and steps tiny
-_MOST_STEPS = 100  # of the integration from one sample to the next, on average: no friction that a record shows needs them
+_MOST_STEPS = 100  # of the integration for each sample: no friction that a record can show needs more
 _UNTOLD_SD = math.log(10.0) / (2 * 1.96)  # of a logarithm: the 95 % interval is a factor of ten wide
 _UNRESOLVED = 10.0  # answers of the machine, a / (k v) each, or characteristic slips from one sample to the next
 
 
 def fit_steps(
-    time_s: FloatArray, friction: FloatArray, drive: Drive, law: str, stiffness_per_m: float = math.nan
-) -> TraceLaw:
+    time_s: FloatArray, friction: FloatArray, laws: Sequence[str], drive: Drive, stiffness_per_m: float = math.nan
+) -> list[TraceLaw]:
     """Rate and state, and the machine, from a record of friction under steps of speed.
 
     The slider has no inertia. The model is friction of the law under the drive, with a steady drift per slip. Noise is
@@ -324,26 +324,20 @@ def fit_steps(
     ----------
     time_s, friction
         Evenly sampled record, shape (n,); friction is force over normal load.
+    laws : sequence of "dieterich" and "ruina"
+        Ageing or slip law, with one state. All are fitted to one stretch of the record: their likelihoods can be
+        compared.
     drive
         Speeds of the drive; time counts from the first sample.
-    law : "dieterich" or "ruina"
-        Ageing or slip law, with one state.
     stiffness_per_m
         Stiffness of the machine over the normal load in 1/m, where it is known; else it is fitted.
 
     Returns
     -------
-    TraceLaw
-        mu0 at the first speed, a, b, a - b, Dc_m and stiffness_per_m with 95 % intervals. A parameter whose interval is
-        wider than a factor of ten (a - b: wider than a itself) cannot be told.
+    list of TraceLaw
+        Of every law mu0 at the first speed, a, b, a - b, Dc_m and stiffness_per_m with 95 % intervals. A parameter
+        whose interval is wider than a factor of ten (a - b: wider than a itself) cannot be told.
     """
-    return fit_laws(time_s, friction, drive, (law,), stiffness_per_m)[0]
-
-
-def fit_laws(
-    time_s: FloatArray, friction: FloatArray, drive: Drive, laws: Sequence[str], stiffness_per_m: float = math.nan
-) -> list[TraceLaw]:
-    """As :func:`fit_steps` for several laws, on one stretch of the record: their likelihoods can be compared."""
     time, mu = time_s - time_s[0], friction
     starts = {law: _best_of_starts(time, mu, drive, law, stiffness_per_m) for law in laws}
     near = _near_steps(time, mu, drive, math.exp(max(start[4] for start in starts.values())))
@@ -421,10 +415,11 @@ def _model(time: FloatArray, drive: Drive, law: str, stiffness_per_m: float) -> 
     out = np.empty((2, time.size))
 
     def friction(p: FloatArray) -> FloatArray:
+        slips = np.exp(p[4:5]).clip(slip / _UNRESOLVED)
         stiffness = min(stiffness_per_m if p.size < 6 else math.exp(p[5]), _UNRESOLVED * p[2] / slip)
         parameters = np.array([p[0], v0, p[2], stiffness])
         possible = p[2] > 0.0 and integrated(
-            np.array([p[0], 0.0]), time, knots, speeds, parameters, p[3:4], np.exp(p[4:5]).clip(slip / _UNRESOLVED), law == "dieterich",
+            np.array([p[0], 0.0]), time, knots, speeds, parameters, p[3:4], slips, law == "dieterich",
             _TOLERANCE, _MOST_STEPS * time.size, WEIGHTS, out,
         )  # fmt: skip
         return out[0] + p[1] * place if possible else np.full(time.size, np.nan)
@@ -586,9 +581,8 @@ def _of_slips(
         record = trace.time_s[inside], np.abs(trace.force_N[inside] - pull.zero_N)
         wanted = SLIP_LAWS if law == "auto" else (law,)
         slips = [slip for slip in pull.slips if slip.fail_s > start]
-        made = [fit_slips(*record, name, test.normal_load_N, speed, slips) for name in wanted]
-        fitted = [replace(one, test_id=test_id) for one in made if one is not None]
-        yield from chosen_slip_laws(fitted)
+        fitted = fit_slips(*record, wanted, test.normal_load_N, speed, slips)
+        yield from chosen_slip_laws([replace(one, test_id=test_id) for one in fitted])
 
 
 def chosen_slip_laws(fitted: Sequence[TraceLaw]) -> list[TraceLaw]:
@@ -619,7 +613,7 @@ def _of_steps(
     friction = np.abs(trace.force_N[inside] - pull.zero_N) / test.normal_load_N
     known = test.stiffness_N_per_m / test.normal_load_N if test.stiffness_N_per_m else math.nan
     wanted = STEP_LAWS if law == "auto" else (law,)
-    fitted = fit_laws(trace.time_s[inside], friction, drive, wanted, known)
+    fitted = fit_steps(trace.time_s[inside], friction, wanted, drive, known)
     yield from chosen_step_laws(fitted)
 
 

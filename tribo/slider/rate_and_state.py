@@ -77,10 +77,9 @@ def integrated(
     b: FloatArray, Dc_m: FloatArray, ageing: bool, tolerance: float, most_steps: int, weights: FloatArray,
     out: FloatArray,
 ) -> bool:  # fmt: skip
-    """Friction coefficient and ln(v0 theta / Dc) at the given times, without inertia; False where a step vanishes or too many are
-    needed.
+    """Friction coefficient and ln(v0 theta / Dc) at the given times, without inertia; False where it cannot be followed.
 
-    Steps end at every time that is asked for and at every knot of the drive. ``parameters`` are mu0, v0, a and
+    It cannot where a step vanishes or more are needed than are granted. Steps end at every time that is asked for and at every knot of the drive. ``parameters`` are mu0, v0, a and
     stiffness over load.
     """
     n = start.size
