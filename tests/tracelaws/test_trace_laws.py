@@ -13,6 +13,7 @@ from support.virtual_slips import ladder, slips, strokes, velocity_step
 
 from tribo import tracelaws
 from tribo.slider import SliderConfig, constant_speed, recorded_displacement, simulate_slider, speed_steps
+from tribo.slider.rate_and_state import WEIGHTS, integrated
 from tribo.tracelaws import (
     SPEED_LAWS,
     chosen_slip_laws,
@@ -100,6 +101,23 @@ def test_rate_and_state_is_recovered_from_a_step_of_speed_and_the_other_law_is_r
         assert p.told
         assert p.value == pytest.approx(truth, rel=0.06)
         assert p.low - 0.5 * (p.high - p.low) < truth < p.high + 0.5 * (p.high - p.low)
+
+
+def test_the_stiffness_of_a_machine_that_is_rigid_to_the_record_is_not_told_and_the_law_is():
+    time, mu = velocity_step(np.random.default_rng(2), **{**STEP, "stiffness_per_m": 1e7})
+    (found,) = fit_steps(time, mu, ["dieterich"], DRIVE)
+    assert not found["stiffness_per_m"].told
+    for name, truth in (("a", 0.008), ("b", 0.011), ("Dc_m", 12e-6)):
+        assert found[name].told
+        assert found[name].value == pytest.approx(truth, rel=0.06)
+
+
+def test_a_slip_shorter_than_a_record_shows_is_given_up_before_it_takes_minutes():
+    law = np.array([0.6, 1e-6, 4e-6, 400.0])  # mu0, first speed, a and stiffness over load
+    drive = np.array([0.0, 80.0]), np.array([1e-6, 1e-5])
+    times, out = np.arange(1800) / 10.0, np.empty((2, 1800))
+    given = np.array([0.6, 0.0]), times, *drive, law, np.array([-8e-4]), np.array([1e-9]), False, 1e-9
+    assert not integrated(*given, 180_000, WEIGHTS, out)
 
 
 def test_whitened_noise_has_no_memory():

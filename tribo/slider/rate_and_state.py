@@ -77,10 +77,10 @@ def integrated(
     b: FloatArray, Dc_m: FloatArray, ageing: bool, tolerance: float, most_steps: int, weights: FloatArray,
     out: FloatArray,
 ) -> bool:  # fmt: skip
-    """Friction coefficient and ln(v0 theta / Dc) at the given times, without inertia; False where it cannot be followed.
+    """Friction coefficient and ln(v0 theta / Dc) at the given times, without inertia; False if it cannot be followed.
 
-    It cannot where a step vanishes or more are needed than are granted. Steps end at every time that is asked for and at every knot of the drive. ``parameters`` are mu0, v0, a and
-    stiffness over load.
+    Steps end at every time that is asked for and at every knot of the drive. ``parameters`` are mu0, v0, a and
+    stiffness over load. The motion cannot be followed where a step vanishes or more than ``most_steps`` are needed.
     """
     n = start.size
     y, trial = start.copy(), np.empty(n)
