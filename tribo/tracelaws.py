@@ -18,7 +18,18 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares, minimize
 from scipy.stats import t as student
 
-from tribo.records import MEDIAN_TO_SD, FloatArray, Ingested, Phase, Slip, Test, Trace, TraceLaw, TraceLawParameter
+from tribo.records import (
+    MEDIAN_TO_SD,
+    FloatArray,
+    Ingested,
+    Phase,
+    Pull,
+    Slip,
+    Test,
+    Trace,
+    TraceLaw,
+    TraceLawParameter,
+)
 from tribo.slider.motion import Drive, speed_steps
 from tribo.slider.rate_and_state import WEIGHTS, integrated
 from tribo.traces.events import slips_of
@@ -514,12 +525,14 @@ def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]
         left out clearly better (by twice the standard error, and by 20 to 1), the ageing law of Dieterich or the slip
         law of Ruina where its likelihood is 20 times that of the other; of a drive that goes to and fro, a law of
         ``DRIVEN_LAWS`` where none clearly predicts strokes left out better; of seven stretches at five speeds or more
-        (of a record, or of the records of one sample at one load), a law of ``SPEED_LAWS`` in the same way. Laws that
-        are tied are all given.
+        (of a record, or of the records of one sample at one load), a law of ``SPEED_LAWS`` in the same way; of five
+        records of stick-slip with four times at rest, at one load of a sample, again Coulomb's law or that of ageing.
+        Laws that are tied are all given.
     """
     tests = {test.test_id: test for test in ingested.campaign.tests}
     found: list[TraceLaw] = []
-    pooled: dict[str, list[tuple[float, float]]] = {}
+    stretches: dict[str, list[tuple[float, float]]] = {}
+    rests: dict[str, list[tuple[float, float]]] = {}
     for name, pieces in groupby(ingested.traces.items(), key=lambda item: _record_of(item[0])):
         traces = list(pieces)
         test, pull = tests.get(traces[0][0]), ingested.pulls.get(traces[0][0])
@@ -535,14 +548,20 @@ def trace_laws_of(ingested: Ingested, law: str = "auto") -> tuple[TraceLaw, ...]
             (phase.speed_m_s, phase.force_N / test.normal_load_N)
             for test_id, _ in traces for phase in ingested.pulls[test_id].phases if phase.name == _STEADY
         ] if all(test_id in ingested.pulls for test_id, _ in traces) else []  # fmt: skip
-        by_speed = list(_of_speeds(steady, name, law))
+        by_speed = list(_of_means(fit_speeds, SPEED_LAWS, steady, name, law))
         found += by_speed
         speed = test.speed_m_s or ingested.campaign.pull_speed_m_s or math.nan
+        where = f"{test.sample}, {test.normal_load_N:g} N"
         if not by_speed:
             whole = steady or [(speed, pull.sliding_N / test.normal_load_N)]
-            pooled.setdefault(f"{test.sample}, {test.normal_load_N:g} N", []).extend(whole)
-    for name, stretches in pooled.items():
-        found += _of_speeds(stretches, name, law)
+            stretches.setdefault(where, []).extend(whole)
+        for slips in (_in_stick_slip(ingested.pulls.get(test_id)) for test_id, _ in traces):
+            if len(slips) >= FEWEST_SLIPS:
+                rests.setdefault(where, []).append(at_rest(slips, test.normal_load_N))
+    for name, means in stretches.items():
+        found += _of_means(fit_speeds, SPEED_LAWS, means, name, law)
+    for name, means in rests.items():
+        found += _of_means(fit_rests, SLIP_LAWS, means, name, law)
     return tuple(found)
 
 
@@ -573,20 +592,31 @@ def _of_slips(
     for test_id, trace in traces:
         pull, test = ingested.pulls.get(test_id), tests[test_id]
         speed = test.speed_m_s or ingested.campaign.pull_speed_m_s
-        shows = pull is not None and pull.oscillation is not None and pull.oscillation.regime == "stick-slip"
-        if not shows or pull is None or speed is None or not speed > 0 or law not in ("auto", *SLIP_LAWS):
+        slips = _in_stick_slip(pull)
+        if not slips or pull is None or speed is None or not speed > 0 or law not in ("auto", *SLIP_LAWS):
             continue
-        start = pull.window_s[0]
-        inside = trace.time_s >= start
+        inside = trace.time_s >= pull.window_s[0]
         record = trace.time_s[inside], np.abs(trace.force_N[inside] - pull.zero_N)
         wanted = SLIP_LAWS if law == "auto" else (law,)
-        slips = [slip for slip in pull.slips if slip.fail_s > start]
         fitted = fit_slips(*record, wanted, test.normal_load_N, speed, slips)
-        yield from chosen_slip_laws([replace(one, test_id=test_id) for one in fitted])
+        yield from unbeaten([replace(one, test_id=test_id) for one in fitted])
 
 
-def chosen_slip_laws(fitted: Sequence[TraceLaw]) -> list[TraceLaw]:
-    """Those that no other law clearly beats on slips left out."""
+def _in_stick_slip(pull: Pull | None) -> list[Slip]:
+    """The slips of a pull that sticks and slips, after its first loading."""
+    if pull is None or pull.oscillation is None or pull.oscillation.regime != "stick-slip":
+        return []
+    return [slip for slip in pull.slips if slip.fail_s > max(pull.window_s[0], slip.start_s)]
+
+
+def at_rest(slips: Sequence[Slip], normal_load_N: float) -> tuple[float, float]:
+    """Geometric mean time stuck in s, and mean static friction over normal load, of slips."""
+    stuck = np.log([slip.fail_s - slip.start_s for slip in slips])
+    return math.exp(stuck.mean()), float(np.mean([slip.peak_N for slip in slips])) / normal_load_N
+
+
+def unbeaten(fitted: Sequence[TraceLaw]) -> list[TraceLaw]:
+    """Those that no other law clearly beats on what was left out of the fits."""
     return [law for law in fitted if not any(clearly_better(other, law) for other in fitted)]
 
 
@@ -628,7 +658,7 @@ def _of_strokes(traces: Sequence[tuple[str, Trace]], law: str) -> Iterable[Trace
     record = _joined([replace(trace, force_N=way * trace.force_N) for way, trace in zip(ways, strokes, strict=True)])
     if record.displacement_m is not None:
         fitted = [fit_driven(record.displacement_m, record.force_N, name) for name in wanted]
-        yield from chosen_slip_laws([one for one in fitted if one is not None])
+        yield from unbeaten([one for one in fitted if one is not None])
 
 
 def _ways(traces: Sequence[Trace]) -> list[float]:
@@ -838,15 +868,18 @@ def _driven_fit(
     return np.asarray(best.x), np.asarray(best.jac), np.asarray(best.fun)
 
 
-_SPEED_PARAMETERS = {
+_PARAMETERS = {
     "constant": (("mu_d", "1"),),
     "viscous": (("mu_d", "1"), ("viscous_s_per_m", "s/m")),
     "logarithmic": (("mu_at_1_m_s", "1"), ("per_e_fold", "1")),
     "stribeck": (("mu_d", "1"), ("mu_s", "1"), ("viscous_s_per_m", "s/m"), ("v_s_m_s", "m/s")),
+    "coulomb": (("mu_s", "1"),),
+    "ageing": (("mu_s_after_1_s", "1"), ("b", "1")),
 }
-SPEED_LAWS = tuple(_SPEED_PARAMETERS)
+SPEED_LAWS = ("constant", "viscous", "logarithmic", "stribeck")
 _FEWEST_SPEEDS, _FEWEST_STRETCHES = 5, 7
-_SAME_SPEED = 0.05  # of the logarithm: speeds closer than this are one speed, left out together
+_FEWEST_RESTS, _FEWEST_RECORDS = 4, 5  # times at rest that differ, and records of stick-slip
+_SAME = 0.05  # of the logarithm: speeds or times closer than this are one, left out together
 _PLACES, _REACH = 160, (0.1, 3.0)  # values of v_s tried, from a tenth of the lowest speed to thrice the highest
 _DRAWS = 4000  # of the parameters, for their intervals
 
@@ -884,12 +917,56 @@ def fit_speeds(speed_m_s: FloatArray, friction: FloatArray, law: str = "stribeck
     (0.4, 2.0)
     """
     v, mu = np.asarray(speed_m_s, float), np.asarray(friction, float)
-    order = np.argsort(v)
-    group = np.empty(v.size, int)
-    group[order] = np.concatenate([[0], np.cumsum(np.diff(np.log(v[order])) > _SAME_SPEED)])
-    if v.size < _FEWEST_STRETCHES or group.max() + 1 < _FEWEST_SPEEDS:
-        return None
-    made, weights, values = _over_speed(v, mu, law)
+    group = _alike(v)
+    enough = v.size >= _FEWEST_STRETCHES and group.max() + 1 >= _FEWEST_SPEEDS
+    return _fit_over(v, mu, group, law, "speeds") if enough else None
+
+
+def fit_rests(hold_s: FloatArray, friction: FloatArray, law: str = "ageing") -> TraceLaw | None:
+    """Static friction over the time at rest from records of stick-slip, one value a record; None with too few of them.
+
+    "coulomb" is mu_s, "ageing" mu_s + b ln(t / 1 s). A stronger contact is stuck for longer, so that the slips of one
+    record seem to show growth; means over all slips of a record do not.
+
+    Parameters
+    ----------
+    hold_s, friction
+        Geometric mean time stuck in s, and mean static friction force over normal load, of every record, shape (n,). At
+        least five records with four times that differ.
+    law : "coulomb" or "ageing"
+        The law.
+
+    Returns
+    -------
+    TraceLaw
+        With 95 % intervals; ``scores`` are log densities of the records of each time at rest by a fit without it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tribo.tracelaws import fit_rests
+    >>> t = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
+    >>> law = fit_rests(t, 0.4 + 0.01 * np.log(t) + 1e-4 * np.array([1, -1, 0, 1, -1]))
+    >>> round(law["b"].value, 3), law["b"].told
+    (0.01, True)
+    """
+    t, mu = np.asarray(hold_s, float), np.asarray(friction, float)
+    group = _alike(t)
+    enough = t.size >= _FEWEST_RECORDS and group.max() + 1 >= _FEWEST_RESTS
+    return _fit_over(t, mu, group, law, "rests") if enough else None
+
+
+def _alike(values: FloatArray) -> np.ndarray:
+    """The number of the group of nearly equal values that each is in, from the lowest on."""
+    order = np.argsort(values)
+    group = np.zeros(values.size, int)
+    group[order[1:]] = np.cumsum(np.diff(np.log(values[order])) > _SAME)
+    return group
+
+
+def _fit_over(v: FloatArray, mu: FloatArray, group: np.ndarray, law: str, evidence: str) -> TraceLaw:
+    """Least squares of friction over speed or time at rest, with groups left out for the scores."""
+    made, weights, values = _over(v, mu, law)
     best = int(np.argmax(weights))
     rng = np.random.default_rng(0)
     free = v.size - made[0][0].size - (law == "stribeck")
@@ -906,30 +983,31 @@ def fit_speeds(speed_m_s: FloatArray, friction: FloatArray, law: str = "stribeck
         linear = np.column_stack([linear, values[chosen]])
     low, high = np.quantile(linear, [0.025, 0.975], axis=0)
     rows = []
-    for k, (name, unit) in enumerate(_SPEED_PARAMETERS[law]):
+    for k, (name, unit) in enumerate(_PARAMETERS[law]):
         known = told and high[-1] < 10.0 * low[-1] if law == "stribeck" else high[k] - low[k] < 2.0 * abs(centre[k])
         rows.append(TraceLawParameter(name, float(centre[k]), float(low[k]), float(high[k]), unit, bool(known)))
     scores = np.empty(v.size)
     for one in range(int(group.max()) + 1):
         out = group == one
-        parts, likely, places = _over_speed(v[~out], mu[~out], law)
+        parts, likely, places = _over(v[~out], mu[~out], law)
         k = int(np.argmax(likely))
         beta, scale, root = parts[k]
         X = _columns(v[out], law, places[k])
         freedom = int((~out).sum()) - beta.size - (law == "stribeck")
         spread = np.sqrt(scale**2 + ((X @ root) ** 2).sum(axis=1))
         scores[out] = student.logpdf((mu[out] - X @ beta) / spread, freedom) - np.log(spread)
-    return TraceLaw(law, tuple(rows), float(scores.sum()), v.size, "speeds", tuple(scores))
+    return TraceLaw(law, tuple(rows), float(scores.sum()), v.size, evidence, tuple(scores))
 
 
 def _columns(v: FloatArray, law: str, v_s: float) -> FloatArray:
     one = np.ones_like(v)
     if law == "stribeck":
         return np.column_stack([one, np.exp(-v / v_s), v])
-    return np.column_stack({"constant": [one], "viscous": [one, v], "logarithmic": [one, np.log(v)]}[law])
+    line = {"viscous": v, "logarithmic": np.log(v), "ageing": np.log(v)}
+    return np.column_stack([one, line[law]] if law in line else [one])
 
 
-def _over_speed(
+def _over(
     v: FloatArray, mu: FloatArray, law: str
 ) -> tuple[list[tuple[FloatArray, float, FloatArray]], FloatArray, FloatArray]:
     """Linear fits (values, scatter, root of their covariance) for every v_s, the weight of each, and the v_s."""
@@ -949,11 +1027,11 @@ def _over_speed(
     return made, weights / weights.sum(), places
 
 
-def _of_speeds(
-    stretches: Sequence[tuple[float, float]], name: str, law: str
-) -> Iterable[TraceLaw]:
-    """Friction over speed of the stretches (speed, friction) of a record, or of the records of one sample and load."""
-    wanted = [one for one in SPEED_LAWS if law in ("auto", one)]
-    speed, friction = np.array([pair for pair in stretches if pair[0] > 0 and math.isfinite(pair[1])]).reshape(-1, 2).T
-    fitted = [fit_speeds(speed, friction, one) for one in wanted]
-    yield from chosen_slip_laws([replace(one, test_id=name) for one in fitted if one is not None])
+def _of_means(
+    fit: Callable[[FloatArray, FloatArray, str], TraceLaw | None], laws: Sequence[str],
+    means: Sequence[tuple[float, float]], name: str, law: str,
+) -> Iterable[TraceLaw]:  # fmt: skip
+    """Laws of friction over speed or time at rest, means of a record or of the records of one sample and load."""
+    at, friction = np.array([pair for pair in means if pair[0] > 0 and math.isfinite(pair[1])]).reshape(-1, 2).T
+    fitted = [fit(at, friction, one) for one in laws if law in ("auto", one)]
+    yield from unbeaten([replace(one, test_id=name) for one in fitted if one is not None])

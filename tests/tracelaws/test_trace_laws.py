@@ -15,16 +15,18 @@ from tribo import tracelaws
 from tribo.slider import SliderConfig, constant_speed, recorded_displacement, simulate_slider, speed_steps
 from tribo.slider.rate_and_state import WEIGHTS, integrated
 from tribo.tracelaws import (
+    SLIP_LAWS,
     SPEED_LAWS,
-    chosen_slip_laws,
     chosen_step_laws,
     clearly_better,
     driven_force,
     fit_driven,
+    fit_rests,
     fit_slips,
     fit_speeds,
     fit_steps,
     slip_force,
+    unbeaten,
     white_likelihood,
     whitening,
 )
@@ -150,6 +152,53 @@ def test_the_command_writes_the_laws_of_a_record_with_stick_slip(tmp_path: Path)
     assert {row["law"] for row in found.values()} == {"coulomb"}
 
 
+def stick_slip_campaign(folder: Path, speeds_mm_s: list[float], b: float) -> Path:
+    """Records of one sample at one load whose static friction grows by b per e-fold of the time at rest."""
+    (folder / "raw").mkdir(parents=True)
+    (folder / "campaign.toml").write_text('[campaign]\ntitle = "t"\n[patterns.F]\ncavity = "none"\n')
+    lines = ["test_id,file,sample,normal_load_N,speed_mm_s"]
+    for k, speed in enumerate(speeds_mm_s):
+        given = COULOMB | {"speed_m_s": 1e-3 * speed, "mu_s": 0.36 - b * math.log(200.0), "b": b, "duration_s": 12.0}
+        time, force = slips(np.random.default_rng(20 + k), rate_Hz=500.0, **given)
+        rows = [f"{t:.4f},{f:.7f},{t * speed:.6f}" for t, f in zip(time, force, strict=True)]
+        (folder / "raw" / f"{k}.csv").write_text("Time (s),Load (N),Extension (mm)\n" + "\n".join(rows) + "\n")
+        lines.append(f"T{k},raw/{k}.csv,F,0.3,{speed}")
+    (folder / "tests.csv").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def test_growth_at_rest_is_told_by_the_records_of_one_sample_at_several_speeds(tmp_path: Path):
+    folder = stick_slip_campaign(tmp_path / "c", [0.3, 0.5, 0.9, 1.5, 2.2], b=0.006)
+    result = on_the_command_line.run("fit", folder, "-o", tmp_path / "out", "--trace-law", "auto")
+    assert result.exit_code == 0, result.stderr
+    with open(tmp_path / "out" / "tracelaws.csv", newline="") as file:
+        of_all = [row for row in csv.DictReader(file) if row["test_id"] == "F, 0.3 N" and row["law"] in SLIP_LAWS]
+    assert {row["law"] for row in of_all} == {"ageing"}
+    b = next(row for row in of_all if row["parameter"] == "b")
+    assert float(b["low"]) < 0.006 < float(b["high"])
+    assert float(b["low"]) > 0.0
+    assert b["told"] == "yes"
+
+
+def test_slips_of_a_stronger_contact_are_stuck_for_longer_and_their_means_show_no_growth():
+    rng = np.random.default_rng(6)
+    hold, friction = [], []
+    for stuck in np.geomspace(0.1, 10.0, 6):
+        strength = 0.4 * (1.0 + 0.05 * rng.standard_normal(200))
+        hold.append(math.exp(np.log(stuck * strength / 0.4).mean()))
+        friction.append(strength.mean())
+    coulomb, ageing = (fit_rests(np.array(hold), np.array(friction), law) for law in ("coulomb", "ageing"))
+    assert coulomb is not None
+    assert ageing is not None
+    assert "coulomb" in [law.law for law in unbeaten([coulomb, ageing])]
+    assert ageing["b"].low < 0.0 < ageing["b"].high
+    assert coulomb["mu_s"].low < 0.4 < coulomb["mu_s"].high
+
+
+def test_four_records_of_stick_slip_tell_no_growth():
+    assert fit_rests(np.geomspace(0.1, 10.0, 4), np.full(4, 0.4)) is None
+
+
 DRIVEN = {"forward_N": 12e3, "backward_N": 8e3, "stiffness": 4e6, "backlash_m": 4e-3, "amplitude_m": 0.02,
           "frequency_Hz": 1.0, "cycles": 8, "rate_Hz": 200.0, "noise_N": 200.0}  # fmt: skip
 
@@ -169,7 +218,7 @@ def test_friction_each_way_stiffness_and_backlash_are_recovered_from_strokes_and
     drive, force = strokes(np.random.default_rng(4), **DRIVEN)
     made = [fit_driven(drive, force + 1.5e3, law) for law in ("driven_backlash", "driven_directions")]
     assert made[1] is not None
-    assert [law.law for law in chosen_slip_laws(made)] == ["driven_directions"]
+    assert [law.law for law in unbeaten(made)] == ["driven_directions"]
     truths = {"forward_N": 12e3, "backward_N": 8e3, "stiffness_N_per_m": 4e6, "backlash_m": 4e-3, "zero_N": 1.5e3}
     for name, truth in truths.items():
         p = made[1][name]
@@ -220,7 +269,7 @@ def test_stribeck_friction_is_recovered_from_a_ladder_of_speeds_and_beats_the_ot
     rng = np.random.default_rng(8)
     friction = 0.25 + 0.15 * np.exp(-LADDER / 3e-4) + 5.0 * LADDER + 0.004 * rng.standard_normal(16)
     made = [fit_speeds(LADDER, friction, law) for law in SPEED_LAWS]
-    assert [law.law for law in chosen_slip_laws([law for law in made if law])] == ["stribeck"]
+    assert [law.law for law in unbeaten([law for law in made if law])] == ["stribeck"]
     for name, value in truth.items():
         p = made[-1][name]
         assert p.told
@@ -233,7 +282,7 @@ def test_constant_friction_tells_no_stribeck_law_and_four_speeds_tell_none():
     friction = 0.3 + 0.004 * rng.standard_normal(16)
     made = [fit_speeds(LADDER, friction, law) for law in SPEED_LAWS]
     assert not made[-1]["v_s_m_s"].told
-    assert "constant" in [law.law for law in chosen_slip_laws([law for law in made if law])]
+    assert "constant" in [law.law for law in unbeaten([law for law in made if law])]
     assert fit_speeds(np.repeat([1e-4, 1e-3, 1e-2, 1e-1], 4), friction) is None
 
 
