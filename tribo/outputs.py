@@ -365,8 +365,8 @@ COMPARISON = {
     "ratio_high": "upper end",
 }
 TRACE_LAWS = {
-    "test_id": "the test, or the record of which it is a level",
-    "law": "coulomb, ageing, dieterich or ruina; laws that are tied are all listed",
+    "test_id": "the test, the record of which it is a level, or sample and load of a law of several records",
+    "law": "name of the law, as for `--trace-law`; laws that are tied are all listed",
     "parameter": "parameter of the law or the machine, with its unit at the end of the name",
     "value": "best value, in `unit`",
     "low": "lower end of its 95 % interval",

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -257,7 +258,8 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
 
 NUISANCES: dict[Nuisance, int] = {"days": SESSION, "drift": DRIFT, "specimen_drift": SPECIMEN_DRIFT}
 DRAWS = 1000  # of the random effects, for the interval of their size
-NUISANCE_STEPS = np.linspace(-2.0, 1.0, 7)  # of the logarithm of a size about its estimate, to average over
+# Of the logarithm of a size about its estimate, to average over: where it is beyond chance, and where it is not
+NUISANCE_STEPS, FURTHER_STEPS = np.linspace(-1.6, 1.0, 5), np.linspace(0.0, 2.6, 4)
 
 
 def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
@@ -265,19 +267,23 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     the root mean square of what it adds to ln T over the tests of the campaign, about its mean, with a 90 % interval.
 
     The chance is that of a likelihood ratio with the sizes of both regimes free or held still. The interval is that of
-    the random effects given the campaign, averaged over their sizes.
+    the random effects given the campaign, averaged over the sizes of all three kinds: days and drift take each other's
+    place in part, and a kind that is not beyond chance may still be there.
     """
-    s, rng, layers = f.setup, np.random.default_rng(0), []
+    s, rng = f.setup, np.random.default_rng(0)
+    chances: dict[Nuisance, float] = {}
     for name, group in NUISANCES.items():
-        here = (s.group == group) | (s.group == group + 1)
-        if not here.any():
-            continue
-        held, offset = held_still(s, here)
-        ratio = f.score - fit(held, f.acting, start=f, iterations=15).score - offset
-        p = float(chi2.sf(2.0 * max(ratio, 0.0), 2))
-        if p >= level:
-            continue
-        drawn = np.concatenate([_realised(g, here, int(DRAWS * share), rng) for g, share in _over_sizes(f, here)])
+        here = _of_kind(s, group)
+        if here.any():
+            held, offset = held_still(s, here)
+            ratio = f.score - fit(held, f.acting, start=f, iterations=15).score - offset
+            chances[name] = float(chi2.sf(2.0 * max(ratio, 0.0), 2))
+    told = {name: p for name, p in chances.items() if p < level}
+    fits = _over_sizes(f, {NUISANCES[name]: p < level for name, p in chances.items()}) if told else []
+    layers = []
+    for name, p in told.items():
+        here = _of_kind(s, NUISANCES[name])
+        drawn = np.concatenate([_realised(g, here, int(DRAWS * share), rng) for g, share in fits])
         low, middle, high = 100.0 * np.quantile(drawn, (0.05, 0.5, 0.95))
         layers.append(
             Layer(
@@ -288,12 +294,20 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     return layers
 
 
-def _over_sizes(f: ModelFit, here: NDArray[np.bool_]) -> list[tuple[ModelFit, float]]:
-    """The fit with the sizes of some random effects held at several multiples, all others estimated anew, and how
-    likely each makes the campaign, adding to one."""
+def _of_kind(s: Setup, group: int) -> NDArray[np.bool_]:
+    """The random effects (q,) of one kind of nuisance, in the mean of both regimes and in their difference."""
+    return np.asarray((s.group == group) | (s.group == group + 1))
+
+
+def _over_sizes(f: ModelFit, kinds: dict[int, bool]) -> list[tuple[ModelFit, float]]:
+    """The fit with the sizes of all kinds of nuisance, given by group and whether each is beyond chance, held at a grid
+    of them, all others estimated anew, and how likely each makes the campaign, adding to one."""
     s, fits, log_weight = f.setup, [], []
-    for step in NUISANCE_STEPS:
-        sizes = f.noise.sizes * np.exp(step)
+    here = np.any([_of_kind(s, group) for group in kinds], axis=0)
+    for steps in product(*(NUISANCE_STEPS if beyond else FURTHER_STEPS for beyond in kinds.values())):
+        sizes = f.noise.sizes.copy()
+        for group, step in zip(kinds, steps, strict=True):
+            sizes[group : group + 2] *= np.exp(step)
         held = replace(
             s, unit=np.where(here, s.unit * sizes[np.maximum(s.group, 0)], s.unit), group=np.where(here, FIXED, s.group)
         )
