@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares, minimize
-from scipy.stats import t as student
+from scipy.stats import norm, t as student
 
 from tribo.records import (
     MEDIAN_TO_SD,
@@ -303,9 +303,13 @@ def _scores(before: FloatArray, slope: FloatArray, stuck: FloatArray, law: str) 
 
 
 def clearly_better(one: TraceLaw, other: TraceLaw) -> bool:
-    """Whether a law predicts slips left out better than another: by twice the standard error, and by 20 to 1."""
+    """Whether a law predicts what was left out better than another: by twice the standard error, and by 20 to 1.
+
+    Where little was left out, the standard error is uncertain itself: it is the same chance by the t distribution.
+    """
     gain = np.array(one.scores) - np.array(other.scores)
-    return bool(gain.sum() > max(_CLEAR * gain.std(ddof=1) * math.sqrt(gain.size), _LIKELIER))
+    clear = float(student.isf(norm.sf(_CLEAR), gain.size - 1))
+    return bool(gain.sum() > max(clear * gain.std(ddof=1) * math.sqrt(gain.size), _LIKELIER))
 
 
 Filter = Callable[[FloatArray], FloatArray]

@@ -12,6 +12,7 @@ from blind.direct import ingested
 from blind.tribometer import hide
 from support import first_quick
 
+from tribo.diagnostics import inference
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.observations import observe, place_in_series, session_of, walks
 from tribo.wording.verdict_sentences import worded
@@ -71,6 +72,14 @@ def test_what_moves_is_told_with_its_size_and_is_no_cause(seed: int, name: str, 
     (layer,) = [layer for layer in v.layers if layer.kind == "nuisance"]
     assert layer.name == name
     assert layer.effect_percent == pytest.approx(100 * SIZE, rel=0.25)
+
+
+def test_what_a_drift_beside_them_may_be_widens_the_interval_of_days(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted = diagnosed(1, days, small=True).baseline
+    (told,) = inference.nuisance_layers(fitted, 0.01)
+    monkeypatch.setattr(inference, "FURTHER_STEPS", np.zeros(1))
+    (alone,) = inference.nuisance_layers(fitted, 0.01)
+    assert told.high - told.low > 1.05 * (alone.high - alone.low)
 
 
 @pytest.mark.slow
