@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,7 +15,10 @@ from support import first_quick
 
 from tribo.diagnostics import inference
 from tribo.diagnostics.diagnosis import Diagnosis, examine
+from tribo.diagnostics.fit import precision_of
+from tribo.diagnostics.model import FIXED
 from tribo.diagnostics.observations import observe, place_in_series, session_of, walks
+from tribo.diagnostics.scatter import prior_sd
 from tribo.wording.verdict_sentences import worded
 
 SIZE = 0.06  # of ln T, root mean square
@@ -74,10 +78,29 @@ def test_what_moves_is_told_with_its_size_and_is_no_cause(seed: int, name: str, 
     assert layer.effect_percent == pytest.approx(100 * SIZE, rel=0.25)
 
 
-def test_what_a_drift_beside_them_may_be_widens_the_interval_of_days(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_effects_that_are_drawn_have_the_mean_and_the_scatter_of_the_fit_where_their_sizes_are_known() -> None:
+    fitted = diagnosed(1, days, small=True).baseline
+    s = fitted.setup
+    sd = prior_sd(s, fitted.noise.sizes)
+    known = replace(fitted, setup=replace(s, unit=sd, group=np.full(s.n_effects, FIXED)), precision=sd**-2)
+    drawn = inference.drawn_effects(known, np.random.default_rng(4))
+    share = inference.informed_share(fitted.noise)
+    columns = known.columns
+    precision = precision_of(known.factor, known.weight) * share
+    weighted, prior = columns.weighted(precision), columns.prior(known.precision[None])
+    exact = weighted.normal.with_prior(*columns.sides(prior)).inverse()
+    right = weighted.with_residual(known.residual.T[None])
+    mean = columns.vector(*exact.solution(*right))[0, columns.parameters :]
+    spread = np.sqrt(columns.vector(*exact.variances)[0, columns.parameters :])
+    off = (drawn.mean(axis=0) - mean) / spread * np.sqrt(len(drawn))
+    assert np.abs(off).max() < 5.0
+    np.testing.assert_allclose(drawn.std(axis=0) / spread, 1.0, atol=0.12)
+
+
+def test_what_the_sizes_may_be_widens_the_interval_of_days(monkeypatch: pytest.MonkeyPatch) -> None:
     fitted = diagnosed(1, days, small=True).baseline
     (told,) = inference.nuisance_layers(fitted, 0.01)
-    monkeypatch.setattr(inference, "FURTHER_STEPS", np.zeros(1))
+    monkeypatch.setattr(inference, "SIZE_PRIORS", [])  # no size is drawn: all stay those of the fit
     (alone,) = inference.nuisance_layers(fitted, 0.01)
     assert told.high - told.low > 1.05 * (alone.high - alone.low)
 

@@ -66,6 +66,20 @@ def test_the_heat_map_of_a_campaign_without_effect_marks_nothing(nothing: Diagno
     assert set(cells["observable"]) >= {"both", "static", "sliding", "drop"}
 
 
+def test_tests_without_a_time_do_not_count_in_the_cells_of_time(temperature: Diagnosis) -> None:
+    f = temperature.baseline
+    o = f.setup.observations
+    gone = np.arange(o.n) % 3 == 0
+    times = replace(o.conditions, elapsed_s=np.where(gone, np.nan, o.conditions.elapsed_s))
+    f = replace(f, setup=replace(f.setup, observations=replace(o, conditions=times)))
+    cells = misfit.misfit_numbers(replace(temperature, baseline=f)).query("row == @misfit.ALL and observable == 'both'")
+    assert np.isfinite(cells["effect_percent"]).all()
+    told = cells[cells["covariate"] == "started_at"]["effect_percent"].item()
+    y, x = residual_on_flat(f)[~gone].mean(axis=1), times.elapsed_s[~gone]
+    line = np.polyfit(x, y, 1)[0] * np.subtract(*np.quantile(x, [0.95, 0.05]))
+    assert told == pytest.approx(100 * np.expm1(line), rel=1e-6)
+
+
 def test_the_heat_map_marks_the_samples_that_the_verdict_says_differ_and_no_other_mean(patterns_off: Diagnosis) -> None:
     cells = misfit.misfit_numbers(patterns_off)
     means = cells[(cells["covariate"] == "mean") & cells["observable"].isin(["static", "sliding"])]

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +17,11 @@ from scipy.special import gammaln
 from scipy.stats import chi2, norm
 
 from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
-from tribo.diagnostics.fit import ModelFit, fit, fit_without
+from tribo.diagnostics.fit import ModelFit, fit, fit_without, precision_of
 from tribo.diagnostics.model import (
     DRIFT,
     FIXED,
     N_LAW,
-    OF_A_SPECIMEN,
     PATTERN,
     SESSION,
     SPECIMEN_DRIFT,
@@ -31,10 +29,10 @@ from tribo.diagnostics.model import (
     Setup,
     Target,
 )
-from tribo.diagnostics.normal_equations import model_columns
+from tribo.diagnostics.normal_equations import Normal, block_cholesky, model_columns
 from tribo.diagnostics.observations import Observations
 from tribo.diagnostics.replicates import drawn_residuals, refits
-from tribo.diagnostics.scatter import Noise, held_still, log_size_prior
+from tribo.diagnostics.scatter import SIZE_PRIORS, Noise, held_still, log_size_prior, prior_sd
 from tribo.diagnostics.verdict import Estimate, Gain, Layer, Nuisance
 from tribo.records import REGIMES, FloatArray
 
@@ -257,9 +255,7 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
 
 
 NUISANCES: dict[Nuisance, int] = {"days": SESSION, "drift": DRIFT, "specimen_drift": SPECIMEN_DRIFT}
-DRAWS = 1000  # of the random effects, for the interval of their size
-# Of the logarithm of a size about its estimate, to average over: where it is beyond chance, and where it is not
-NUISANCE_STEPS, FURTHER_STEPS = np.linspace(-1.6, 1.0, 5), np.linspace(0.0, 2.6, 4)
+CHAINS, SETTLING, KEPT = 40, 20, 40  # of draws of the random effects; steps of a chain, before it counts and after
 
 
 def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
@@ -267,24 +263,22 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     the root mean square of what it adds to ln T over the tests of the campaign, about its mean, with a 90 % interval.
 
     The chance is that of a likelihood ratio with the sizes of both regimes free or held still. The interval is that of
-    the random effects given the campaign, averaged over the sizes of all three kinds: days and drift take each other's
-    place in part, and a kind that is not beyond chance may still be there.
+    the random effects given the campaign, whatever the sizes of all of them are: days and drift take each other's place
+    in part, and a kind that is not beyond chance may still be there.
     """
-    s, rng = f.setup, np.random.default_rng(0)
-    chances: dict[Nuisance, float] = {}
-    for name, group in NUISANCES.items():
-        here = _of_kind(s, group)
+    s, chances = f.setup, {}
+    kinds = {name: (s.group == group) | (s.group == group + 1) for name, group in NUISANCES.items()}
+    for name, here in kinds.items():
         if here.any():
             held, offset = held_still(s, here)
             ratio = f.score - fit(held, f.acting, start=f, iterations=15).score - offset
             chances[name] = float(chi2.sf(2.0 * max(ratio, 0.0), 2))
     told = {name: p for name, p in chances.items() if p < level}
-    fits = _over_sizes(f, {NUISANCES[name]: p < level for name, p in chances.items()}) if told else []
+    drawn = drawn_effects(f, np.random.default_rng(0)) if told else np.zeros((0, s.n_effects))
     layers = []
     for name, p in told.items():
-        here = _of_kind(s, NUISANCES[name])
-        drawn = np.concatenate([_realised(g, here, int(DRAWS * share), rng) for g, share in fits])
-        low, middle, high = 100.0 * np.quantile(drawn, (0.05, 0.5, 0.95))
+        sizes = [_realised(s, np.where(kinds[name], part, 0.0)) for part in np.array_split(drawn, KEPT)]
+        low, middle, high = 100.0 * np.quantile(np.concatenate(sizes), (0.05, 0.5, 0.95))
         layers.append(
             Layer(
                 kind="nuisance", name=name, samples=(), regimes=tuple(REGIMES), p_adjusted=p,
@@ -294,46 +288,38 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     return layers
 
 
-def _of_kind(s: Setup, group: int) -> NDArray[np.bool_]:
-    """The random effects (q,) of one kind of nuisance, in the mean of both regimes and in their difference."""
-    return np.asarray((s.group == group) | (s.group == group + 1))
+def drawn_effects(f: ModelFit, rng: np.random.Generator) -> FloatArray:
+    """Draws of the random effects given the campaign, over all that their sizes may be, (CHAINS * KEPT, q).
+
+    By turns the effects given their sizes, with law and mechanisms linear about the fit, and the sizes given the
+    effects (Gibbs sampling: Gelfand and Smith, JASA 85 (1990) 398). Weights and repeats are those of the fit.
+    """
+    s, columns = f.setup, f.columns
+    weighted = columns.weighted(precision_of(f.factor, f.weight) * informed_share(f.noise))
+    normal, right = weighted.normal, weighted.with_residual(f.residual.T[None])
+    base = Normal(*(np.repeat(part, CHAINS, axis=0) for part in (normal.own, normal.across, normal.border)))
+    sides = np.repeat(right[0], CHAINS, axis=0), np.repeat(right[1], CHAINS, axis=0)
+    sizes, kept = np.repeat(f.noise.sizes[None], CHAINS, axis=0), []
+    for step in range(SETTLING + KEPT):
+        prior = columns.prior(prior_sd(s, sizes) ** -2)
+        root = block_cholesky(base.with_prior(*columns.sides(prior)), sides)
+        own, border = (part + rng.standard_normal(part.shape) for part in root.right)
+        border = np.einsum("rkm,rk->rm", root.border, border)
+        own = np.einsum("rsab,rsa->rsb", root.own, own - np.einsum("rsam,rm->rsa", root.across, border))
+        effects = columns.vector(own, border)[:, columns.parameters :]
+        for group, (expected, worth) in enumerate(SIZE_PRIORS):
+            here = s.group == group
+            if here.any():
+                squares = np.sum((effects[:, here] / s.unit[here]) ** 2, axis=1) + worth * expected**2
+                sizes[:, group] = np.sqrt(squares / rng.chisquare(worth + here.sum(), CHAINS))
+        if step >= SETTLING:
+            kept.append(effects)
+    return np.concatenate(kept)
 
 
-def _over_sizes(f: ModelFit, kinds: dict[int, bool]) -> list[tuple[ModelFit, float]]:
-    """The fit with the sizes of all kinds of nuisance, given by group and whether each is beyond chance, held at a grid
-    of them, all others estimated anew, and how likely each makes the campaign, adding to one."""
-    s, fits, log_weight = f.setup, [], []
-    here = np.any([_of_kind(s, group) for group in kinds], axis=0)
-    for steps in product(*(NUISANCE_STEPS if beyond else FURTHER_STEPS for beyond in kinds.values())):
-        sizes = f.noise.sizes.copy()
-        for group, step in zip(kinds, steps, strict=True):
-            sizes[group : group + 2] *= np.exp(step)
-        held = replace(
-            s, unit=np.where(here, s.unit * sizes[np.maximum(s.group, 0)], s.unit), group=np.where(here, FIXED, s.group)
-        )
-        fits.append(fit(held, f.acting, start=f, iterations=15))
-        prior = sum(float(log_size_prior(int(g), sizes[g])) for g in np.unique(s.group[here]))
-        log_weight.append(fits[-1].score + prior)
-    weight = np.exp(np.array(log_weight) - max(log_weight))
-    return list(zip(fits, (weight / weight.sum()).tolist(), strict=True))
-
-
-def _realised(f: ModelFit, here: NDArray[np.bool_], draws: int, rng: np.random.Generator) -> FloatArray:
-    """Root mean square over the tests of what some random effects add to ln T, about its mean, in draws from what the
-    campaign tells of them, (draws,)."""
-    s, share = f.setup, informed_share(f.noise)
-    own, shared = np.zeros((s.specimens, OF_A_SPECIMEN), bool), here[s.of_specimens :]
-    own[:] = here[: s.of_specimens].reshape(s.specimens, OF_A_SPECIMEN)
-    drawn = np.repeat(np.where(here, f.effects, 0.0)[None], draws, axis=0)
-    if shared.any():
-        places = np.flatnonzero(shared)
-        border = f.columns.parameters + places
-        covariance = f.inverse.border[0][np.ix_(border, border)] / share
-        drawn[:, s.of_specimens + places] += rng.multivariate_normal(np.zeros(len(places)), covariance, draws)
-    if own.any():
-        sd = np.sqrt(f.inverse.variances[0][0] / share)
-        drawn[:, : s.of_specimens] += rng.normal(size=(draws, s.of_specimens)) * np.where(own, sd, 0.0).ravel()
-    added = s.on_tests(drawn)
+def _realised(s: Setup, effects: FloatArray) -> FloatArray:
+    """Root mean square over the tests of what random effects (d, q) add to ln T, about its mean, (d,)."""
+    added = s.on_tests(effects)
     return np.asarray(np.sqrt(np.mean((added - added.mean(axis=1, keepdims=True)) ** 2, axis=(1, 2))))
 
 

@@ -136,8 +136,9 @@ def misfit_numbers(d: Diagnosis) -> pd.DataFrame:
     size and the p of a mean are those of the verdict where the patterned samples differ from the model by more than its
     stated error, or where it is a misfit beside the causes; of both regimes together the geometric mean and the
     larger p.
-    The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
-    stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
+    Tests without a value of a covariate do not count in its cells. The observable "trace" has the change of the zero
+    (of the median sliding force), of the slope of the rise and of the stick-slip amplitude, with the p value of a rank
+    correlation, adjusted for the number of cells.
     """
     from tribo.diagnostics.fit import residual_on_flat
 
@@ -155,8 +156,9 @@ def _cells(d: Diagnosis, columns: list[Covariate], observable: str, residual: Fl
     told = _told_means(d)
     cells, shapes = [], []
     for row in (*samples, ALL):
-        here = np.ones(len(sample), bool) if row == ALL else sample == row
+        of_row = np.ones(len(sample), bool) if row == ALL else sample == row
         for column in columns:
+            here = of_row & np.isfinite(column.score)
             if column.name in taken_up.get(row, ()) and not (column.name == "mean" and (row, observable) in told):
                 continue
             shape = _shape(column, here)
@@ -242,8 +244,8 @@ def _trace_cells(d: Diagnosis, columns: list[Covariate]) -> list[dict[str, Any]]
 
     found = []
     for name, values in _trace_observables(d).items():
-        good = np.isfinite(values)
         for column in columns:
+            good = np.isfinite(values) & np.isfinite(column.score)
             x = column.score[good]
             if column.name in ("mean", "normal_load_N", BEND) or good.sum() < 12:
                 continue
