@@ -187,7 +187,6 @@ def table(rows: list[dict]) -> str:
             error = f"{100 * np.median([abs(r[1] / r[0] - 1) for r in told]):.2f} %" if told else "-"
             seen = f"{100 * len(told) / len(found):.0f} %"
             lines.append(f"| {truth} | `{name}` | {len(found)} | {seen} | {share} | {error} |")
-        of = [row for row in of if row["chosen"] is not None]  # of records that were read before a change of the choice
         right = OVER_RESTS.get(truth, truth)
         alone = sum(row["chosen"] == [right] for row in of)
         tied = sum(right in row["chosen"] and len(row["chosen"]) > 1 for row in of)

@@ -901,16 +901,16 @@ class TraceLaw:
     parameters : tuple of TraceLawParameter
         Parameters of law and machine with intervals.
     log_likelihood : float
-        Of slips and strokes: log density of all of them, each by a fit without its part of the record. Of steps of
-        speed: of the whole record, without the terms that two laws share.
+        Of slips, strokes, speeds and rests: log density of all of them, each by a fit without its part of the evidence.
+        Of steps of speed: of the whole record, without the terms that two laws share.
     samples : int
-        Slips, strokes or samples that count.
+        Slips, strokes, stretches, records or samples that count.
     evidence : str
-        "slips", "strokes", "speeds" or "steps of speed".
+        "slips", "strokes", "speeds", "rests" or "steps of speed".
     scores : tuple of float
-        Log density of each slip, stroke or stretch left out of the fit; empty for steps of speed.
+        Log density of each slip, stroke, stretch or record left out of the fit; empty for steps of speed.
     test_id : str
-        The test.
+        The test; of a law of several records, sample and load.
     """
 
     law: str

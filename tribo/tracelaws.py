@@ -2,7 +2,8 @@
 
 Which records of a campaign hold a law beyond mu and tau0, slips under Coulomb friction or its growth at rest (maximum
 likelihood over slips), rate and state from steps of speed (least squares of whitened residuals), friction with backlash
-from a drive that goes to and fro (least squares, with strokes as the evidence), and Stribeck friction over speed.
+from a drive that goes to and fro (least squares, with strokes as the evidence), and means of several stretches or
+records: friction over speed, static friction over the time at rest.
 """
 
 from __future__ import annotations
@@ -424,17 +425,17 @@ def _model(time: FloatArray, drive: Drive, law: str, stiffness_per_m: float) -> 
     """
     knots, speeds = np.array(drive.knots_s), np.array(drive.speeds_m_s)
     v0 = float(speeds[0])
-    slip = float(speeds[speeds > 0].min() * np.median(np.diff(time)))
+    between_samples_m = float(speeds[speeds > 0].min() * np.median(np.diff(time)))
     place = drive.position_m(time)
     place = (place - place.mean()) / np.ptp(place)
     out = np.empty((2, time.size))
 
     def friction(p: FloatArray) -> FloatArray:
-        slips = np.exp(p[4:5]).clip(slip / _UNRESOLVED)
-        stiffness = min(stiffness_per_m if p.size < 6 else math.exp(p[5]), _UNRESOLVED * p[2] / slip)
+        Dc = np.exp(p[4:5]).clip(between_samples_m / _UNRESOLVED)
+        stiffness = min(stiffness_per_m if p.size < 6 else math.exp(p[5]), _UNRESOLVED * p[2] / between_samples_m)
         parameters = np.array([p[0], v0, p[2], stiffness])
         possible = p[2] > 0.0 and integrated(
-            np.array([p[0], 0.0]), time, knots, speeds, parameters, p[3:4], slips, law == "dieterich",
+            np.array([p[0], 0.0]), time, knots, speeds, parameters, p[3:4], Dc, law == "dieterich",
             _TOLERANCE, _MOST_STEPS * time.size, WEIGHTS, out,
         )  # fmt: skip
         return out[0] + p[1] * place if possible else np.full(time.size, np.nan)

@@ -297,8 +297,12 @@ def drawn_effects(f: ModelFit, rng: np.random.Generator) -> FloatArray:
     s, columns = f.setup, f.columns
     weighted = columns.weighted(precision_of(f.factor, f.weight) * informed_share(f.noise))
     normal, right = weighted.normal, weighted.with_residual(f.residual.T[None])
-    base = Normal(*(np.repeat(part, CHAINS, axis=0) for part in (normal.own, normal.across, normal.border)))
-    sides = np.repeat(right[0], CHAINS, axis=0), np.repeat(right[1], CHAINS, axis=0)
+
+    def in_each(part: FloatArray) -> FloatArray:
+        return np.broadcast_to(part, (CHAINS, *part.shape[1:]))
+
+    base = Normal(in_each(normal.own), in_each(normal.across), in_each(normal.border))
+    sides = in_each(right[0]), in_each(right[1])
     sizes, kept = np.repeat(f.noise.sizes[None], CHAINS, axis=0), []
     for step in range(SETTLING + KEPT):
         prior = columns.prior(prior_sd(s, sizes) ** -2)
