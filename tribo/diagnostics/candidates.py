@@ -15,7 +15,8 @@ import numpy as np
 
 from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import Acting, Target, with_free_columns
+from tribo.diagnostics.model import Acting, Target, effect_of, with_free_columns
+from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
 from tribo.display import displayed
 from tribo.records import FloatArray
@@ -30,6 +31,9 @@ IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, fro
 TIED = (3.0, 0.08)
 ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
 CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart explains about equally
+LIKELY = 4.6  # log likelihood: odds of 100 to 1, the level of a misfit
+ANY_FACTOR = 1.0  # standard deviation of ln T of a day that may differ by any factor
+NO_CHANGE = 1e-9  # of ln T
 IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
 
 
@@ -79,7 +83,25 @@ def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[CauseCand
         judged(start.model, refitted(c.fit, c.fit.acting), c.raw - c.gain) if c.gain > hopeful else c
         for c in tried.values()
     ]
-    return sorted(fitted, key=lambda c: -c.gain)
+    standing = [c for c in fitted if c.gain <= hopeful or _more_than_days_differ(start.model, c)]
+    return sorted(standing, key=lambda c: -c.gain)
+
+
+def _more_than_days_differ(start: ModelFit, c: CauseCandidate) -> bool:
+    """Whether a cause of whole sessions is likely beside a factor of any size on these in each regime.
+
+    One day may differ from the others by far more than is usual, and a physical cause of one day has to show more than
+    that: another course in the load and the samples. A recorded column claims no more than that it differs.
+    """
+    s = c.fit.setup
+    here = np.any(np.abs(effect_of(s, c.fit.law, c.acting, c.values)) > NO_CHANGE, axis=1)
+    session = session_of(s.observations.conditions)
+    if c.acting.mechanism.any_column or here.all() or np.isin(session[~here], session[here]).any():
+        return True
+    apart = s.with_effects(here[:, None, None] * np.eye(2), np.full(2, ANY_FACTOR))
+    differs = fit(apart, start.acting, start=start)
+    beside = judged(differs, fit(apart, c.fit.acting, start=c.fit), c.raw - c.gain)
+    return beside.gain > LIKELY
 
 
 def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
