@@ -100,8 +100,8 @@ def _more_than_days_differ(start: ModelFit, c: CauseCandidate) -> bool:
         return True
     apart = s.with_effects(here[:, None, None] * np.eye(2), np.full(2, ANY_FACTOR))
     differs = fit(apart, start.acting, start=start)
-    beside = judged(differs, fit(apart, c.fit.acting, start=c.fit), c.raw - c.gain)
-    return beside.gain > LIKELY
+    beside = judged(differs, fit(apart, c.fit.acting, start=c.fit), 0.0)
+    return beside.raw > LIKELY
 
 
 def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
