@@ -9,13 +9,13 @@ designs that learn from campaigns on earlier ones.
     python benchmarks/design_exam.py table docs/data/design-exam.csv
 
 ``hidden``: a design of one of three families is drawn and simulated at six loads, static and sliding, or at fewer
-(``--loads``) drawn from the six; what it has is the target, within 5 %. The best answer is simulated with fresh seeds on
-half the mesh of the answer, its lengths off by as much as its tolerance of making says. Contact is elastic there: with
-rigid contact friction of patterns has no limit as the mesh shrinks. ``impossible``: 1.4 to 2.2 times the friction of the
-flat sample; friction far below what the smallest wall allows; a ratio along over across of square holes in a square
-lattice; static friction of three to four times sliding. ``direction``: the largest static friction along over across of
-staggered rectangles, against the best of ``--count`` designs run one by one. The model's error is set to zero: the truth
-here is the model.
+(``--loads``) drawn from the six; what it has is the target, within 5 %. The best answer is simulated with fresh seeds
+on half the mesh of the answer, its lengths off by as much as its tolerance of making says. Contact is elastic there:
+with rigid contact friction of patterns has no limit as the mesh shrinks. ``impossible``: 1.4 to 2.2 times the
+friction of the flat sample; friction far below what the smallest wall allows; a ratio along over across of square
+holes in a square lattice; static friction of three to four times sliding. ``direction``: the largest static friction
+along over across of staggered rectangles, against the best of ``--count`` designs run one by one. The model's error
+is set to zero: the truth here is the model.
 
 ``loop``: worlds in which patterned samples have 15 to 30 % more or less friction than the model (``World``), static and
 sliding by factors of their own. A hidden design is drawn; what it has in the world is wanted within 8 %: its static

@@ -17,7 +17,7 @@ from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen,
 from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.fit import ModelFit, fit, residual_on_flat
-from tribo.diagnostics.model import PATTERN, Setup, effect_of, setup
+from tribo.diagnostics.model import SPECIMEN_DRIFT, Setup, effect_of, setup
 from tribo.diagnostics.observations import enough, observe, session_of
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.scatter import held_still
@@ -119,7 +119,7 @@ def examine(
         return effects, screened, exclusions(observations.conditions, evidence, effects.absorbed)
 
     effects, screened, barred = screened_at(s)
-    still, offset = held_still(s, s.group > PATTERN)
+    still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
     certain = effects.model.score - (fit(still).score + offset) > FOR_A_CAUSE
     strongest = screened.contrasts[int(np.argmax(screened.strength))].column
     share = BESIDE_DRIFT if certain and strongest != "time of day" else 1.0  # what comes back every day is no drift

@@ -51,7 +51,7 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
 
     The average over the error of the model's patterns, each size weighed by how likely it makes the campaign.
     """
-    if not (f.setup.group == PATTERN).any():
+    if not f.setup.of_patterns.any():
         return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
     weight, fits = over_pattern_error(f)
     ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
@@ -85,9 +85,10 @@ def understated(f: ModelFit, index: int) -> FloatArray:
 
 def over_pattern_error(f: ModelFit) -> tuple[FloatArray, list[ModelFit]]:
     """The fit at several sizes of the pattern error, and how likely each makes the campaign, adding to one."""
-    factors = f.noise.pattern * np.exp(PATTERN_STEPS)
-    fits = [with_pattern_error(f, factor) for factor in factors]
-    log_weight = np.array([g.score + _log_freedom(g) for g in fits]) + log_size_prior(PATTERN, factors)
+    fits = [with_pattern_error(f, factor) for factor in f.noise.pattern * np.exp(PATTERN_STEPS)]
+    log_weight = np.array([g.score + _log_freedom(g) for g in fits])
+    for group in (PATTERN, PATTERN + 1):
+        log_weight += log_size_prior(group, f.noise.sizes[group] * np.exp(PATTERN_STEPS))
     weight = np.exp(log_weight - log_weight.max())
     return weight / weight.sum(), fits
 
@@ -102,10 +103,12 @@ def _log_freedom(f: ModelFit) -> float:
 
 
 def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
-    """The fit with the error of the patterns held at ``factor`` times what the predictor states."""
+    """The fit with the error of the patterns held at ``factor`` times what the predictor states; what both regimes have
+    in common of it stays as it is."""
     s = f.setup
-    here = s.group == PATTERN
-    held = replace(s, unit=np.where(here, factor * s.unit, s.unit), group=np.where(here, FIXED, s.group))
+    sizes = f.noise.sizes[np.maximum(s.group, 0)] * factor / f.noise.pattern
+    unit, group = np.where(s.of_patterns, sizes * s.unit, s.unit), np.where(s.of_patterns, FIXED, s.group)
+    held = replace(s, unit=unit, group=group)
     return fit(held, f.acting, start=f, iterations=15)
 
 
@@ -196,8 +199,7 @@ def pattern_excess(f: ModelFit) -> tuple[float, float] | None:
     """The estimated error of the model over the stated one, and the chance of such a factor where the true one is at
     most WITHIN (likelihood ratio, one-sided); None where the factor is not larger."""
     s = f.setup
-    patterns = s.group[s.of_specimens :] == PATTERN
-    if not patterns.any() or f.noise.pattern <= WITHIN:
+    if not s.of_patterns.any() or f.noise.pattern <= WITHIN:
         return None
     ratio = 2.0 * (f.score - with_pattern_error(f, WITHIN).score)
     return f.noise.pattern, max(0.5 * float(chi2.sf(max(ratio, 0.0), 1)), 1e-12)
@@ -212,7 +214,7 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
     lowest, the middle and the highest are given.
     """
     s = f.setup
-    patterns = np.flatnonzero(s.group[s.of_specimens :] == PATTERN)
+    patterns = np.flatnonzero(s.of_patterns[s.of_specimens :])
     if not len(patterns):
         return []
     weight, fits = over_pattern_error(f)

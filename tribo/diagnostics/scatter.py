@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.model import FIXED, PATTERN, Setup
+from tribo.diagnostics.model import FIXED, PATTERN, SPECIMEN_DRIFT, Setup
 from tribo.display import displayed
 from tribo.records import FloatArray
 
@@ -21,7 +21,7 @@ from tribo.records import FloatArray
 SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.01, 2.0), (1.0, 1.0)
 NUISANCE_PRIOR = (0.005, 1.0)
 SIZE_PRIORS = np.array(
-    [SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR, *(6 * [NUISANCE_PRIOR])]
+    [prior for prior in (SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR, *(3 * [NUISANCE_PRIOR])) for _ in range(2)]
 )
 FIRST_NUISANCE = 0.03  # size from which the estimation of each of the last six starts
 REPEAT_PRIOR = (0.08, 4.0)
@@ -32,10 +32,10 @@ SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 @displayed()
 @dataclass(frozen=True)
 class Noise:
-    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance, and ``sizes`` (11,) of the
+    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance, and ``sizes`` (12,) of the
     groups of random effects, in the order of :mod:`tribo.diagnostics.model`.
 
-    That of the patterns is the factor on the error that the predictor states. The standard deviation of the
+    Those of the patterns are factors on the error that the predictor states. The standard deviation of the
     repeats of a test is multiplied by exp(``scatter`` @ setup.scatter). ``tail`` is the number of degrees of freedom of
     the t distribution of the repeats.
     """
@@ -47,8 +47,8 @@ class Noise:
 
     @property
     def pattern(self) -> float:
-        """The factor on the error of the patterns."""
-        return float(self.sizes[PATTERN])
+        """The factor on the error of the patterns, over both regimes."""
+        return float(np.sqrt(np.mean(self.sizes[PATTERN : PATTERN + 2] ** 2)))
 
     def per_test(self, s: Setup) -> FloatArray:
         """Covariance of the repeats of every test, (n, 2, 2)."""
@@ -60,7 +60,7 @@ class Noise:
 def first_noise() -> Noise:
     """Where the estimation of the noise starts."""
     sizes = SIZE_PRIORS[:, 0].copy()
-    sizes[PATTERN + 1 :] = FIRST_NUISANCE
+    sizes[SPECIMEN_DRIFT:] = FIRST_NUISANCE
     return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), sizes)
 
 
@@ -96,13 +96,13 @@ def log_prior(s: Setup, noise: Noise) -> float:
 
 
 def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
-    """Standard deviation of every random effect for sizes (..., 11), shape (..., q)."""
+    """Standard deviation of every random effect for sizes (..., 12), shape (..., q)."""
     known = np.ones((*sizes.shape[:-1], 1))
     return np.asarray(s.unit * np.concatenate([sizes, known], axis=-1)[..., s.group])
 
 
 def updated_sizes(s: Setup, sizes: FloatArray, effects: FloatArray, variance: FloatArray) -> FloatArray:
-    """Sizes (..., 11) from predicted effects (..., q) and their variances (..., q)."""
+    """Sizes (..., 12) from predicted effects (..., q) and their variances (..., q)."""
     known = 1.0 - variance / prior_sd(s, sizes) ** 2
     squares = (effects / s.unit) ** 2
     updated = sizes.copy()

@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tribo.diagnostics.effect_sizes import percent
-from tribo.diagnostics.model import PATTERN
 from tribo.figures import style
 from tribo.figures.misfit import (
     LOGARITHMIC,
@@ -169,7 +168,7 @@ def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray, *, stat
     or with that which the campaign shows, as all else is.
     """
     f = d.baseline
-    over = np.where((f.setup.group == PATTERN) & stated, max(f.noise.pattern, 1.0), 1.0)
+    over = np.where(f.setup.of_patterns & stated, max(f.noise.pattern, 1.0), 1.0)
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
     repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
     shared = f.setup.take(rows).summed(weight) / len(rows)
