@@ -39,7 +39,7 @@ def test_away_from_the_bounds_the_curvature_gives_the_interval() -> None:
 
 def test_at_a_bound_the_interval_opens_to_the_inside() -> None:
     """A load that is lifted leaves no room for suction: the best value is zero, but some suction is possible."""
-    f = fitted("suction", ("normal_load_error", -0.4))
+    f = fitted("suction", ("normal_load_error", -0.8))
     low, high = intervals(f, 0)[0]
     assert f.values[0][0] == low == 0.0
     assert 10.0 < high < 3000.0
@@ -78,6 +78,12 @@ def off_by(factor: float) -> ModelFit:
         for sample, sign in (("A", 1), ("B", -1), ("C", 1))
     )
     return fit(replace(f.setup, observations=replace(o, log_force=o.log_force + off)), f.acting)
+
+
+def test_patterns_that_are_off_alike_in_both_regimes_have_a_larger_error_in_the_mean_than_in_the_difference() -> None:
+    f = off_by(4.0)
+    assert f.noise.sizes[PATTERN] > 2 * f.noise.sizes[PATTERN + 1]
+    assert f.noise.pattern > 1.5
 
 
 def test_an_averaged_interval_keeps_to_the_bounds() -> None:
@@ -119,8 +125,9 @@ def test_the_freedom_of_a_fit_is_half_the_log_determinant_of_law_and_mechanisms(
 
 def test_a_pattern_error_that_is_held_is_no_longer_estimated() -> None:
     f = fitted("temperature", ("temperature", 1.0))
-    held, here = with_pattern_error(f, 2.5), f.setup.group == PATTERN
-    assert held.setup.unit[here] == pytest.approx(2.5 * f.setup.unit[here])
+    held, here = with_pattern_error(f, 2.5), f.setup.of_patterns
+    sizes = f.noise.sizes[f.setup.group[here]] / f.noise.pattern
+    assert held.setup.unit[here] == pytest.approx(2.5 * sizes * f.setup.unit[here])
     assert np.array_equal(held.setup.unit[~here], f.setup.unit[~here])
     assert (held.setup.group[here] == FIXED).all()
     assert np.array_equal(held.setup.group[~here], f.setup.group[~here])

@@ -25,7 +25,7 @@ from tribo.diagnostics.fit import (
     whitened,
     with_noise_estimated,
 )
-from tribo.diagnostics.model import FIXED, OF_A_SPECIMEN, PATTERN, SLOPE, Setup, Target, setup
+from tribo.diagnostics.model import FIXED, OF_A_SPECIMEN, PATTERN, SLOPE, SPECIMEN_DRIFT, Setup, Target, setup
 from tribo.diagnostics.normal_equations import Inverse, ModelColumns, model_columns
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
@@ -74,7 +74,7 @@ def noise_of(s: Setup, tail: float = NORMAL) -> Noise:
     repeat = np.array([[0.0081, 0.002], [0.002, 0.0049]])
     scatter = np.array([0.3, -0.1, -0.2, -0.15])
     assert len(scatter) == s.scatter.shape[1]
-    sizes = np.array([0.06, 0.03, 0.02, 0.035, 1.4, 0.021, 0.013, 0.044, 0.026, 0.051, 0.017])
+    sizes = np.array([0.06, 0.03, 0.02, 0.035, 1.7, 1.1, 0.021, 0.013, 0.044, 0.026, 0.051, 0.017])
     return Noise(repeat, sizes, scatter, tail)
 
 
@@ -161,8 +161,8 @@ def test_the_penalised_density_falls_by_the_tests_and_by_the_effects() -> None:
 
 
 def test_the_noise_begins_as_expected() -> None:
-    assert first_noise().sizes[: PATTERN + 1] == pytest.approx(SIZE_PRIORS[: PATTERN + 1, 0])
-    assert first_noise().sizes[PATTERN + 1 :] == pytest.approx(FIRST_NUISANCE)
+    assert first_noise().sizes[:SPECIMEN_DRIFT] == pytest.approx(SIZE_PRIORS[:SPECIMEN_DRIFT, 0])
+    assert first_noise().sizes[SPECIMEN_DRIFT:] == pytest.approx(FIRST_NUISANCE)
     assert first_noise().repeat == pytest.approx(REPEAT_PRIOR[0] ** 2 * np.eye(2))
 
 
@@ -259,12 +259,12 @@ def test_the_density_of_the_sizes_is_a_scaled_inverse_chi_of_each_and_an_inverse
     alike = replace(noise, scatter=None)
     assert log_prior(s, alike) == pytest.approx(expected + 0.5 * np.sum(noise.scatter**2) / SCATTER_SD**2)
     fixed = replace(s, group=np.where(s.group == PATTERN, FIXED, s.group))
-    assert log_prior(fixed, noise) == pytest.approx(expected - float(log_size_prior(PATTERN, np.array(noise.pattern))))
+    assert log_prior(fixed, noise) == pytest.approx(expected - float(log_size_prior(PATTERN, noise.sizes[PATTERN])))
 
 
 def test_the_sizes_of_a_noise_are_those_it_is_given() -> None:
     noise = noise_of(campaign())
-    assert noise.pattern == 1.4
+    assert noise.pattern**2 == pytest.approx(0.5 * (1.7**2 + 1.1**2))
     s = campaign()
     assert prior_sd(s, noise.sizes) ** 2 == pytest.approx(of_effects(s, noise))
     both = prior_sd(s, np.array([noise.sizes, 2 * noise.sizes]))

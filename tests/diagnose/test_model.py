@@ -146,18 +146,25 @@ def test_a_pattern_has_an_offset_a_slope_and_a_curve_in_each_regime_of_the_state
     s = campaign()
     c, p = s.observations.conditions, s.log_pressure
     shapes = (np.ones_like(p), p, p**2 - np.mean(p**2))
-    wanted = [
-        (sample, regime, getattr(s.predictor.error[sample], known)[regime], shape)
-        for sample in ("A", "B", "C")
-        for regime in (0, 1)
-        for known, shape in zip(("offset", "slope", "curve"), shapes, strict=True)
-    ]
-    here = np.flatnonzero(s.group == PATTERN)
-    assert len(here) == len(wanted) == 18
-    for column, (sample, regime, size, shape) in zip(here, wanted, strict=True):
-        assert s.unit[column] == size
-        assert s.dense[:, regime, column] == pytest.approx((c.sample == sample) * shape)
-        assert not s.dense[:, 1 - regime, column].any()
+    columns = s.dense[:, :, s.of_patterns] * s.unit[s.of_patterns]
+    assert columns.shape[2] == 18
+    expected = np.zeros((s.observations.n, 2, 2, s.observations.n))
+    for sample in ("A", "B", "C"):
+        for known, shape in zip(("offset", "slope", "curve"), shapes, strict=True):
+            for regime in (0, 1):
+                along = getattr(s.predictor.error[sample], known)[regime] * (c.sample == sample) * shape
+                expected[:, regime, regime] += np.outer(along, along)
+    assert np.einsum("nrk,mtk->nrtm", columns, columns) == pytest.approx(expected)
+
+
+def test_errors_of_a_pattern_move_both_regimes_alike_or_apart() -> None:
+    s = campaign()
+    for group, sign in ((PATTERN, 1.0), (PATTERN + 1, -1.0)):
+        columns = s.dense[:, :, s.group == group]
+        size = np.array([s.predictor.error["A"].offset])
+        assert columns.shape[2] == 9
+        assert columns[:, 1, 0] * size[0, 0] == pytest.approx(sign * columns[:, 0, 0] * size[0, 1])
+        assert columns[:, 0, 0].any()
 
 
 def test_repeats_may_depend_on_the_sample_and_on_the_force_the_law_expects() -> None:

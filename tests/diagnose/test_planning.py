@@ -19,7 +19,7 @@ from tribo.diagnostics import (
     weighing_table,
 )
 from tribo.diagnostics.candidates import CauseCandidate, Named, weigh
-from tribo.diagnostics.model import PATTERN, Acting, candidates, effect_of
+from tribo.diagnostics.model import PATTERN, SPECIMEN_DRIFT, Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.planning import (
     PAPER_LAW,
@@ -68,7 +68,7 @@ def test_a_ladder_of_speeds_and_holds_shows_both() -> None:
 def test_the_flat_sample_is_said_to_absorb_only_what_acts_on_a_flat_sample() -> None:
     """Where the model for the patterns may be wrong by any amount, that looks like what acts in the cavities."""
     noise = first_noise()
-    sizes = np.where(np.arange(len(noise.sizes)) <= PATTERN, 100.0, noise.sizes)
+    sizes = np.where(np.arange(len(noise.sizes)) < SPECIMEN_DRIFT, 100.0, noise.sizes)
     campaign = hidden(design=Design(masses_g=(25.0, 90.0))).campaign
     found = by_name(plan_design(campaign, noise=replace(noise, sizes=sizes)))
     assert found["pulley_friction"].why == "absorbed"
@@ -272,7 +272,7 @@ def test_a_cause_that_nothing_measures_or_removes_is_narrowed_at_loads_beyond_th
 def test_a_cause_that_pulls_of_any_number_do_not_narrow_is_tested_with_what_was_held_fixed() -> None:
     cause = named_alone("edge_adhesion", 0.1, 0.5)
     sizes = cause.fit.noise.sizes.copy()
-    sizes[PATTERN] = 3.0  # the model is known to be three times as wrong about patterns as it says
+    sizes[PATTERN : PATTERN + 2] = 3.0  # the model is known to be three times as wrong about patterns as it says
     test = settling_test(replace(cause, fit=replace(cause.fit, noise=replace(cause.fit.noise, sizes=sizes))))
     assert test is not None
     assert test.kind == "vary what was fixed"

@@ -9,7 +9,7 @@ import pytest
 
 from tribo.diagnostics.contrasts import screen
 from tribo.diagnostics.fit import fit
-from tribo.diagnostics.model import PATTERN, setup
+from tribo.diagnostics.model import SPECIMEN_DRIFT, setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit, refits, standardised
@@ -40,7 +40,7 @@ def test_a_batch_of_replicates_contrasts_like_each_fitted_by_itself() -> None:
         again = replace(f.setup, observations=replace(f.setup.observations, log_force=log_force))
         refitted, rng = fit(again, start=replace(f, setup=again)), np.random.default_rng(0)
         single = screen(refitted, contrasts, replicates=0, rng=rng).strength[alone].max()
-        still.append(refitted.noise.sizes[PATTERN + 1 :].max() < 0.01)
+        still.append(refitted.noise.sizes[SPECIMEN_DRIFT:].max() < 0.01)
         assert batch[k] > 0.95 * single
         if still[-1]:
             assert batch[k] == pytest.approx(single, rel=0.05)

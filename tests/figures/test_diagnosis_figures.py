@@ -214,12 +214,13 @@ def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_camp
     nothing: Diagnosis,
 ) -> None:
     f = nothing.baseline
-    patterned = f.setup.group == PATTERN
+    patterned = f.setup.of_patterns
     sample = np.flatnonzero(f.setup.observations.conditions.area_fraction < 1.0)
     found = []
     for factor in (1.0, 10.0):
         precision = np.where(patterned, factor**-2.0, f.precision)
-        sizes = np.where(np.arange(len(f.noise.sizes)) == PATTERN, factor, f.noise.sizes)
+        sizes = f.noise.sizes.copy()
+        sizes[PATTERN : PATTERN + 2] = factor
         wrong = replace(f, noise=replace(f.noise, sizes=sizes), precision=precision)
         wrong_in = replace(nothing, baseline=wrong)
         found.append(residuals.variance_of_mean(wrong_in, np.array([1.0, 0.0]), sample, stated=True))

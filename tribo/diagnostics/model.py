@@ -32,7 +32,7 @@ WITHIN_MEASURED = 3.0  # standard uncertainties: one measurement in 400 lies fur
 LAW_SCALE = np.array([1.0, 5.0, 1.0, 5.0])
 LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 100.0, 1000.0]))
 # Groups of random effects that share one size, each in the mean of both regimes and in their difference: gain and
-# slope of the specimens, the patterns, the drift of each specimen along its pulls, the sessions, the drift of the series.
+# slope of the specimens, the patterns, the drift of each specimen along its pulls, the sessions, the series.
 GAIN, SLOPE, PATTERN, SPECIMEN_DRIFT, SESSION, DRIFT = 0, 2, 4, 6, 8, 10
 ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated

@@ -168,7 +168,8 @@ def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray, *, stat
     or with that which the campaign shows, as all else is.
     """
     f = d.baseline
-    over = np.where(f.setup.of_patterns & stated, max(f.noise.pattern, 1.0), 1.0)
+    sizes = f.noise.sizes[np.maximum(f.setup.group, 0)]
+    over = np.where(f.setup.of_patterns & stated, np.maximum(sizes, 1.0), 1.0)
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
     repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
     shared = f.setup.take(rows).summed(weight) / len(rows)
