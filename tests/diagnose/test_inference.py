@@ -38,8 +38,8 @@ def test_away_from_the_bounds_the_curvature_gives_the_interval() -> None:
 
 
 def test_at_a_bound_the_interval_opens_to_the_inside() -> None:
-    """Where cavities push instead of pulling, the best value of suction is zero, but some suction is possible."""
-    f = fitted("suction", ("suction", -1.0))
+    """Rims that adhere less leave no room for suction: the best value is zero, but some suction is possible."""
+    f = fitted("suction", ("edge_adhesion", -1.0))
     low, high = intervals(f, 0)[0]
     assert f.values[0][0] == low == 0.0
     assert 10.0 < high < 3000.0
