@@ -7,14 +7,19 @@ from functools import cache
 
 import numpy as np
 import pytest
-from laboratories.campaign import make
+from laboratories.campaign import make, multiply
 from laboratories.handed_over import handed_over
-from laboratories.laboratory import Laboratory
+from laboratories.laboratory import Laboratory, day_of
 from laboratories.one_value import hide_one_value
 from mechanisms.test_contract import base, conditions
 from support import first_quick
 
 from tribo.diagnostics import examine
+from tribo.diagnostics.candidates import _more_than_days_differ, judged, refitted
+from tribo.diagnostics.fit import fit
+from tribo.diagnostics.model import candidates, setup
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.verdict import Verdict
 from tribo.mechanisms import MECHANISMS
 from tribo.wording.verdict_sentences import worded
@@ -49,6 +54,25 @@ def test_a_lot_that_moves_its_specimens_is_named_although_it_spreads_them() -> N
     v = examine(handed_over(made.bench, 4), seed=4, replicates=(40, 20)).verdict
     assert [c.mechanism for c in v.causes] == ["covariate:lot"]
     assert v.causes[0].choice == f"lot is {made.truth['value']}"
+
+
+@pytest.mark.parametrize(("hidden", "more"), [("factor", False), ("tare", True)])
+def test_a_day_that_differs_by_a_factor_has_no_wrong_tare(hidden: str, more: bool) -> None:
+    """A tare of one day explains something of a factor too. It is a cause where it explains more than a factor does."""
+    bench = make(3, replace(PATTERNS_OFF, days=14)).bench
+    day = day_of(bench.tests)
+    here = day == min(day)
+    if hidden == "factor":
+        multiply(bench, np.outer(here, [0.15, 0.10]))
+    else:
+        bench.static, bench.sliding = bench.static + 0.15 * here, bench.sliding + 0.15 * here
+    o = observe(handed_over(bench, 3))
+    start = fit(setup(o, tabled_predictor(o.patterns)))
+    known = candidates(start.setup, start.law)
+    acting = next(a for a in known if a.name == "tare_of_one_day" and a.choice.endswith(day[here][0]))
+    tare = judged(start, refitted(start, (acting,)), 0.0)
+    assert tare.gain > 3.0
+    assert _more_than_days_differ(start, tare) == more
 
 
 def test_the_remedy_says_which_weight_to_weigh() -> None:

@@ -1,8 +1,8 @@
 """The mixed model of a campaign: the flat law, the shares of each pattern, mechanisms on top, and the random effects.
 
 ln T of test i in regime r = ln law + pattern error + specimen gain + specimen slope x ln p + repeat noise (bivariate
-t over the two regimes of one pull). All sizes are estimated from the campaign: gains and slopes of the specimens, one
-factor on the error that the predictor states for its patterns, and repeats that may differ by sample and by force.
+t over the two regimes of one pull). All sizes are estimated from the campaign: gains and slopes of the specimens,
+factors on the error that the predictor states for its patterns, and repeats that may differ by sample and by force.
 What one specimen alone shows is kept without the tests of the others.
 """
 
