@@ -12,11 +12,11 @@ import pytest
 
 from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.gaps import gaps_of
+from tribo.diagnostics.gaps import gaps_of, told_names
 from tribo.diagnostics.model import Acting, setup
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.diagnostics.score_statistics import RecordedInPart, recorded_in_part
+from tribo.diagnostics.score_statistics import RecordedInPart, gaps_in, recorded_in_part
 from tribo.figures.extended_model import law_numbers_of
 from tribo.lawsearch.grammar import Shape, WrittenLaw, shapes_of
 from tribo.lawsearch.model_choice import FoundLaw
@@ -114,6 +114,37 @@ def test_a_name_that_was_not_recorded_counts_as_the_others_do_on_average() -> No
     assert Shape("level", "operator", level="op2").of(c)[column == "", 0] == pytest.approx(
         np.mean(column[column != ""] == "op2")
     )
+
+
+def names_told(column: np.ndarray, out: np.ndarray, specimen: np.ndarray) -> np.ndarray:
+    """Names of tests in ten days of twenty, those of ``out`` (n,) missing and told by the others."""
+    day = np.repeat([f"2026-03-{k + 1:02d}" for k in range(10)], 20)
+    return told_names(np.where(out, "", column), specimen, np.arange(float(N)), day)
+
+
+def test_names_are_told_by_the_same_specimen_and_by_the_tests_around_and_else_by_nothing() -> None:
+    rng = np.random.default_rng(8)
+    specimen, out = rng.choice([f"s{k}" for k in range(9)], N), rng.random(N) < 0.2
+    lot = np.array([f"m{int(name[1]) % 3}" for name in specimen])
+    assert names_told(lot, out, specimen).tolist() == lot.tolist()
+    operator = np.where(np.arange(N) // 10 % 3 == 0, "op1", "op2")
+    found = names_told(operator, out, specimen)
+    assert (found[out] == operator[out]).sum() > 0.7 * out.sum()
+    assert set(found[out & (found != operator)]) == {""}
+    recipe = rng.choice(["r1", "r2"], N)
+    assert names_told(recipe, out, specimen).tolist() == np.where(out, "", recipe).tolist()
+    whole_day = np.arange(N) // 20 == 4
+    assert (names_told(operator, whole_day, specimen)[whole_day] == "").all()
+
+
+def test_a_name_that_was_told_still_counts_as_not_recorded() -> None:
+    o = in_part()
+    c = o.conditions
+    told = c.columns["operator"].copy()
+    told[1] = "op1"
+    known = replace(c, columns={**c.columns, "operator": told}, told_names={"operator": np.arange(o.n) == 1})
+    assert gaps_in(replace(o, conditions=known))["operator"].tolist() == gaps_in(o)["operator"].tolist()
+    assert replace(o, conditions=known).take(np.arange(3)).conditions.told_names["operator"].tolist() == [0, 1, 0]
 
 
 def test_a_word_in_a_further_column_of_numbers_is_a_gap() -> None:

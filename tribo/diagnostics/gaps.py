@@ -4,6 +4,9 @@ Each gap of a column of numbers is filled once, before anything is fitted, with 
 other columns (ridge regression) and its neighbours in time on the same day. The friction takes no part in this: the
 effect of a column whose gaps are filled so is neither larger nor smaller on average (regression calibration: Carroll,
 Ruppert, Stefanski and Crainiceanu, Measurement Error in Nonlinear Models, 2nd ed. 2006, chapter 4).
+
+A gap in a column of names is filled where the tests around it leave no doubt: a lot belongs to a specimen, an operator
+works for hours.
 """
 
 from __future__ import annotations
@@ -22,12 +25,14 @@ FEWEST_RECORDED, LEAST_RECORDED = 8, 0.2  # values, and share of the tests, from
 DRAWS = 7  # values for a gap, equally likely
 NEIGHBOURS = (4, 8, 16)  # in time on the same day; the number that predicts recorded values best
 PENALTIES = np.geomspace(0.1, 1e4, 11)  # of the ridge regression on standardised columns, in tests
+CERTAIN = 0.95  # share of recorded names that a rule has to find for gaps to be filled by it
 FILLED = ("temperature_C", "humidity_pct", "speed_m_s", "hold_s")
 LOGARITHM, FROM_LOGARITHM = {"speed_m_s": np.log, "hold_s": np.log1p}, {"speed_m_s": np.exp, "hold_s": np.expm1}
 
 
 def with_gaps_filled(c: Conditions, day: StringArray) -> Conditions:
-    """The same conditions with every gap of a column of numbers filled, and what is known of it in ``gaps``.
+    """The same conditions with every gap of a column of numbers filled, and what is known of it in ``gaps``; and with
+    the names that the tests around a gap tell, the tests concerned in ``told_names``.
 
     A column with too few values for that keeps its gaps, as do the times and the order of the tests. ``day`` (n,) is
     the date of every test, empty where it is not known.
@@ -35,10 +40,16 @@ def with_gaps_filled(c: Conditions, day: StringArray) -> Conditions:
     of_conditions = {name: getattr(c, name) for name in FILLED}
     further = {name: n for name, column in c.columns.items() if (n := numbers_in(column)) is not None}
     to_fill = {name: values for name, values in {**of_conditions, **further}.items() if is_to_be_filled(values)}
+    when = c.elapsed_s if np.isfinite(c.elapsed_s).any() else c.run_order
+    names = {name: column for name, column in c.columns.items() if name not in further and (column == "").any()}
+    told = {name: told_names(column, c.specimen, when, day) for name, column in names.items()}
+    c = replace(
+        c, columns={**c.columns, **told},
+        told_names={name: (names[name] == "") & (column != "") for name, column in told.items()},
+    )  # fmt: skip
     if not to_fill:
         return c
     alongside = {**of_conditions, **further, "normal_load_N": c.normal_load_N}  # no time: a trend is not for long gaps
-    when = c.elapsed_s if np.isfinite(c.elapsed_s).any() else c.run_order
     gaps = {name: gaps_of(name, alongside, when, day) for name in to_fill}
     filled = {name: np.where(gap.missing, gap.expected, to_fill[name]) for name, gap in gaps.items()}
     columns = {name: filled[name].astype(str) if name in filled else column for name, column in c.columns.items()}
@@ -47,6 +58,43 @@ def with_gaps_filled(c: Conditions, day: StringArray) -> Conditions:
         c, temperature_C=own["temperature_C"], humidity_pct=own["humidity_pct"], speed_m_s=own["speed_m_s"],
         hold_s=own["hold_s"], columns=columns, gaps=gaps,
     )  # fmt: skip
+
+
+def told_names(column: StringArray, specimen: StringArray, when: FloatArray, day: StringArray) -> StringArray:
+    """A column of names (n,), its gaps filled where the tests around them tell the name.
+
+    Two rules, each only where it finds at least CERTAIN of the recorded names, of FEWEST_RECORDED or more, without
+    them: all others of the specimen have one name; the tests of the same day that were recorded last before and first
+    after it have the same.
+    """
+    found = column.copy()
+    for rule in (_of_specimen(column, specimen), _of_tests_around(column, when, day)):
+        tried = (column != "") & (rule != "")
+        if tried.sum() >= FEWEST_RECORDED and np.mean(rule[tried] == column[tried]) >= CERTAIN:
+            found = np.where(found == "", rule, found)
+    return found
+
+
+def _of_specimen(column: StringArray, specimen: StringArray) -> StringArray:
+    """The one name of the other tests of each specimen; empty where they have several or none."""
+    found = np.zeros_like(column)
+    for test, name in enumerate(specimen):
+        others = column[(specimen == name) & (column != "") & (np.arange(len(column)) != test)]
+        found[test] = others[0] if len(others) and (others == others[0]).all() else ""
+    return found
+
+
+def _of_tests_around(column: StringArray, when: FloatArray, day: StringArray) -> StringArray:
+    """The name of the recorded tests of the same day just before and after each; empty where they differ."""
+    found = np.zeros_like(column)
+    known = np.flatnonzero((column != "") & np.isfinite(when) & (day != ""))
+    for test in np.flatnonzero(np.isfinite(when) & (day != "")):
+        there = known[(day[known] == day[test]) & (known != test)]
+        before, after = there[when[there] <= when[test]], there[when[there] >= when[test]]
+        if len(before) and len(after):
+            last, first = column[before[np.argmax(when[before])]], column[after[np.argmin(when[after])]]
+            found[test] = last if last == first else ""
+    return found
 
 
 def is_to_be_filled(values: FloatArray) -> bool:

@@ -76,7 +76,8 @@ class Observations:
 
         columns = {name: column[keep] for name, column in self.conditions.columns.items()}
         gaps = {name: replace(gap, **cut_record(gap)) for name, gap in self.conditions.gaps.items()}  # type: ignore[arg-type]
-        own = {**cut_record(self.conditions), "columns": columns, "gaps": gaps}
+        told_names = {name: told[keep] for name, told in self.conditions.told_names.items()}
+        own = {**cut_record(self.conditions), "columns": columns, "gaps": gaps, "told_names": told_names}
         conditions = replace(self.conditions, **own)  # type: ignore[arg-type]
         marks = {name: mark[keep] for name, mark in self.marks.items()}
         return replace(self, **{**cut_record(self), "conditions": conditions, "marks": marks})  # type: ignore[arg-type]

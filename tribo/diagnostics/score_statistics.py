@@ -372,7 +372,7 @@ def gaps_in(o: Observations) -> dict[str, np.ndarray]:
     }  # fmt: skip
     missing = {name: ~np.isfinite(values) for name, values in numbers.items()}
     for name, column in c.columns.items():
-        missing[name] = c.gaps[name].missing if name in c.gaps else column == ""
+        missing[name] = c.gaps[name].missing if name in c.gaps else (column == "") | c.told_names.get(name, False)
     return {name: gaps for name, gaps in missing.items() if gaps.any() and not gaps.all()}
 
 

@@ -124,7 +124,8 @@ class Conditions:
     time of day (empty where no time was recorded), ``clip_N`` = k v / (2 f_s), the mean loss of a peak between two
     samples of the recorder.
     ``columns`` holds every further recorded column as text, names that were not recorded being empty. ``gaps`` are the
-    cells of columns of numbers that were filled, by the name of the field or column. ``pattern`` names the pattern of
+    cells of columns of numbers that were filled, by the name of the field or column; ``told_names`` marks the tests
+    (n,) whose name was not recorded and follows from other tests, by column. ``pattern`` names the pattern of
     each test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names. ``without`` names the mechanisms
     that were removed for a test, separated by semicolons; it is empty where none was removed for any test.
     ``mass_kg`` is what was put on the slider; it is empty where no test states it.
@@ -150,6 +151,7 @@ class Conditions:
     columns: Mapping[str, StringArray] = field(default_factory=dict)
     without: StringArray = field(default_factory=lambda: np.array([], str))
     gaps: Mapping[str, Gaps] = field(default_factory=dict)
+    told_names: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     mass_kg: FloatArray = field(default_factory=lambda: np.array([]))
     clock_h: FloatArray = field(default_factory=lambda: np.array([]))
 
