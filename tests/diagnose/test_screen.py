@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from tribo.diagnostics.contrasts import deviate, screen
+from tribo.diagnostics.contrasts import Contrast, deviate, screen
+from tribo.diagnostics.effect_sizes import _direction
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import setup
+from tribo.diagnostics.model import setup, start_changes
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import as_measured
@@ -28,6 +31,21 @@ def test_deviates_are_as_rare_as_the_chi_squared_they_stand_for() -> None:
     values = np.array([9.0, 12.0, 20.0])
     assert norm.sf(deviate(values, freedom)) * 2 == pytest.approx(chi2.sf(values, freedom), rel=1e-6)
     assert np.all(np.diff(deviate(np.linspace(1, 4000, 300), np.full(300, 4))) > -0.6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_misfit_of_a_mechanism_is_positive_where_friction_rises_with_its_column(sign: float) -> None:
+    """Also where the driest pulls lie farther from the mean than the wettest ones."""
+    f = baseline()
+    acting, courses, _ = start_changes(f.setup, f.law)
+    k = next(k for k, a in enumerate(acting) if a.name == "humidity")
+    contrast = Contrast("mechanism", "both", "humidity", "", courses[k], acting[k])
+    c = f.setup.observations.conditions
+    dry = replace(c, humidity_pct=c.humidity_pct.mean() + np.minimum(c.humidity_pct - c.humidity_pct.mean(), 1.0))
+    change = sign * (dry.humidity_pct - dry.humidity_pct.mean())[:, None] * np.ones(2)
+    assert np.abs(change.min() if sign > 0 else change.max()) > 2 * np.abs(change.max() if sign > 0 else change.min())
+    assert _direction(contrast, change, dry) == sign
+    assert _direction(replace(contrast, acting=None), change, dry) == -sign
 
 
 def test_columns_of_the_law_itself_are_cleared_away() -> None:

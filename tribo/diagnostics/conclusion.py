@@ -12,7 +12,7 @@ from tribo.diagnostics.candidates import CauseCandidate, Named, judged, refitted
 from tribo.diagnostics.column_search import with_repeats
 from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.direct_evidence import OF_ZERO, Evidence, stated_evidence
-from tribo.diagnostics.effect_sizes import misfit_of_contrast, percent
+from tribo.diagnostics.effect_sizes import RECORDED, misfit_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
 from tribo.diagnostics.inference import (
     estimates,
@@ -46,7 +46,6 @@ from tribo.records import REGIMES, FloatArray, Ingested
 Weighed = tuple[CauseCandidate, float, Mapping[str, Estimate]]  # with its share and its parameters
 SHOWN = 8
 SHARE = 0.1  # of the largest effect, above which a cause is said to act on a sample or in a regime
-RECORDED = ("speed_m_s", "hold_s", "temperature_C", "humidity_pct", "specimen_run", "elapsed_s")
 END = 0.02  # share of the tests that have the lowest or the highest values of a column, at least
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
 

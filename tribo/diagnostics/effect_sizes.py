@@ -16,6 +16,7 @@ from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
 NORMAL_90 = 1.645  # standard deviations to the ends of a 90 % interval
+RECORDED = ("speed_m_s", "hold_s", "temperature_C", "humidity_pct", "specimen_run", "elapsed_s")
 ENDS = (0.05, 0.95)  # quantiles of a column between which a change is stated
 
 
@@ -66,15 +67,15 @@ Run = Literal["rising", "falling", "hump", "hollow"]
 def misfit_of_contrast(screened: Screen, k: int, log_ratio: FloatArray, conditions: Conditions) -> Misfit:
     """What one contrast of a screen sees in ``log_ratio`` (n, 2), the ln(measured / model) of every test, as a misfit.
 
-    Where no straight line gives its size, that is the peak-to-peak effect of the screen: with the sign of the largest
-    change of a mechanism, without one of several columns. The misfit shows the contrast, between what its size is
+    Where no straight line gives its size, that is the peak-to-peak effect of the screen: positive where a mechanism
+    rises with the recorded number that it follows, else with the sign of its largest change; without a sign of several
+    columns. The misfit shows the contrast, between what its size is
     taken, and the run of the means of groups, of a contrast at several of them.
     """
     contrast, coefficients, size = screened.contrasts[k], screened.coefficients[k], float(screened.size[k])
     value, between = _signed(contrast, log_ratio, conditions)
     if not np.isfinite(value):
-        change = (contrast.columns @ coefficients).ravel()
-        sign = float(np.sign(change[np.abs(change).argmax()])) if contrast.freedom == 1 else 1.0
+        sign = _direction(contrast, contrast.columns @ coefficients, conditions) if contrast.freedom == 1 else 1.0
         value, between = float(percent(sign * min(size, 5.0))), "extremes"
     steps = np.diff(np.concatenate([[0.0], coefficients]))  # between the means of groups; that of the first is zero
     middle = coefficients[:-1].mean() if len(coefficients) > 1 else coefficients[0]
@@ -86,6 +87,18 @@ def misfit_of_contrast(screened: Screen, k: int, log_ratio: FloatArray, conditio
         contrast.observable, contrast.sample, contrast.column, value, float(screened.p[k]), low=low, high=high,
         shows=(replace(contrast, courses=()), between, course),
     )  # fmt: skip
+
+
+def _direction(contrast: Contrast, change: FloatArray, conditions: Conditions) -> float:
+    """The sign of a change (n, 2) of ln T."""
+    needs = contrast.acting.mechanism.needs if contrast.acting is not None else ()
+    if len(needs) == 1 and needs[0] in RECORDED:
+        number = conditions.recorded(needs[0])
+        known = np.isfinite(number)
+        along = float(np.sum(change[known].mean(axis=1) * (number - np.mean(number[known]))[known]))
+        if along != 0.0:
+            return float(np.sign(along))
+    return float(np.sign(change.ravel()[np.abs(change).argmax()]))
 
 
 def _signed(contrast: Contrast, log_ratio: FloatArray, conditions: Conditions) -> tuple[float, Between]:
