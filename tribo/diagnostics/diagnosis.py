@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.diagnostics.candidates import Named, best_beyond_chance, name_causes, weigh, weights_of
+from tribo.diagnostics.candidates import LIKELY, Named, best_beyond_chance, name_causes, weigh, weights_of
 from tribo.diagnostics.conclusion import conclude, exclusions
 from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
 from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
@@ -120,7 +120,7 @@ def examine(
 
     effects, screened, barred = screened_at(s)
     still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
-    certain = effects.model.score - (fit(still).score + offset) > FOR_A_CAUSE
+    certain = effects.model.score - (fit(still).score + offset) > LIKELY
     strongest = screened.contrasts[int(np.argmax(screened.strength))].column
     share = BESIDE_DRIFT if certain and strongest != "time of day" else 1.0  # what comes back every day is no drift
     level, of_nuisance = share * level, level
@@ -142,9 +142,6 @@ def examine(
 # Share of the level of a misfit that remains where days and drift are certain: their shapes are those of the model in
 # part only, and what they leave looks like a cause.
 BESIDE_DRIFT = 0.1
-# Log likelihood, odds of 100 to 1, by which a mechanism alone has to explain a campaign better than days and drift do,
-# where either would do.
-FOR_A_CAUSE = 4.6
 
 
 def _a_cause_instead(
@@ -166,7 +163,7 @@ def _a_cause_instead(
     change = effect_of(best.fit.setup, best.fit.law, best.acting, best.values)
     if session.max() > 0 and all(np.ptp(change[session == k], axis=0).max() < 1e-9 for k in np.unique(session)):
         return False
-    return fit(moving.setup, best.fit.acting, start=moving).score <= best.fit.score + offset + FOR_A_CAUSE
+    return fit(moving.setup, best.fit.acting, start=moving).score <= best.fit.score + offset + LIKELY
 
 
 def residual_table(d: Diagnosis) -> pd.DataFrame:
