@@ -169,7 +169,7 @@ def test_on_one_test_it_changes_the_force_as_its_law_does_over_the_campaign(m: M
         if here is None:
             assert whole[test] == pytest.approx(plain[test])
             continue
-        arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns", "without", "gaps", "mass_kg"}
+        arrays = {f.name for f in fields(c)} - NOT_BY_TEST
         one = replace(c, **{name: getattr(c, name)[[test]] for name in arrays}, columns={"column": np.array(["this"])})
         alone = np.array([[v[test] for v in (b.static_mu, b.static_adhesion_N, b.sliding_mu, b.sliding_adhesion_N)]])
         single = Base(*alone.T, by_sample=LAWS, flat="F")
@@ -213,10 +213,11 @@ def one_run() -> Conditions:
     from dataclasses import fields, replace
 
     c = conditions()
-    arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns", "without", "gaps", "mass_kg"}
+    arrays = {f.name for f in fields(c)} - NOT_BY_TEST
     return replace(c, **{name: getattr(c, name)[[23]] for name in arrays})
 
 
+NOT_BY_TEST = {"nominal_area_m2", "columns", "without", "gaps", "told_names", "mass_kg"}
 RECORDED = {"elapsed_s": 3600.0, "samples_in_rise": 100.0}
 
 
