@@ -50,12 +50,13 @@ from support.sled import SledDesign, SledTribometer, as_bluehill
 
 from tribo.campaign import load_campaign
 from tribo.design import rounds
-from tribo.design.answer import Measured, design, measured_of, place_of
+from tribo.design.answer import Measured, Outcome, design, measured_of, place_of
 from tribo.design.answer_files import campaign_of
 from tribo.design.rounds import Response, Rounds, designed, friction_of, kernel, on_mesh, responses, tried
 from tribo.design.target import Family, Material, Space, Target, Want
 from tribo.records import Pattern, Study
 from tribo.springblock import SimConfig
+from tribo.springblock.design_file import with_parameters
 from tribo.springblock.kept_runs import run_stored
 from tribo.stages import StudyOptions, study
 
@@ -86,6 +87,7 @@ def quiet(said: str, done: int, total: int) -> None:
     """No progress."""
 
 
+BASE = SimConfig(duration_peaks=2.0, cavity_shape="exact")  # as a design has it
 CONTACT = {"contact_stiffness_Pa_per_m": 3e10}  # halving the mesh moves static friction by 1.2 % at most
 
 
@@ -96,8 +98,7 @@ def target_of(wants: list[Want], families: tuple[Family, ...], contact: dict[str
 
 def truth(target: Target, pattern: Pattern, seed: int, halved: bool) -> list[float]:
     """T/N of everything that is wanted, in the order of the responses, at fresh seeds."""
-    config = on_mesh(SimConfig(duration_peaks=2.0, cavity_shape="exact"), "halved" if halved else "fine")
-    config = config.with_(**target.parameters)
+    config = on_mesh(with_parameters(BASE, target.parameters), "halved" if halved else "fine")
     wanted = responses(target)
     with tempfile.TemporaryDirectory() as folder:
         runs = run_stored(designed([pattern], wanted, config, TRUTH_RUNS, seed), Path(folder) / "truth.h5", 1)
@@ -112,10 +113,14 @@ def runs_of(target: Target) -> int:
     return points * (coarse + rounds.FINAL * rounds.FINE_RUNS + 4)
 
 
+def outcome_of(target: Target, seed: int) -> Outcome:
+    with tempfile.TemporaryDirectory() as folder:
+        return design(target, Path(folder), Path(folder), seed, 1, quiet)[0]
+
+
 def answered(target: Target, seed: int) -> Iterator[tuple[int, float, float, float, bool]]:
     """For each want: family, truth at half the mesh with fresh seeds, interval, and whether the target was refused."""
-    with tempfile.TemporaryDirectory() as folder:
-        outcome, _ = design(target, Path(folder), Path(folder), seed, 1, quiet)
+    outcome = outcome_of(target, seed)
     best, rng = outcome.answers[0], np.random.default_rng(seed)
     family = target.pattern[best.space]
     off = {name: value + rng.normal(0.0, family.tolerance_um) for name, value in best.lengths_um.items()}
@@ -157,8 +162,7 @@ def impossible(number: int) -> Iterator[dict[str, object]]:
     else:
         want = Want(friction="static over sliding", pressure_kPa=p, value=float(rng.uniform(3.0, 4.0)))
     target = target_of([want], (family,))
-    with tempfile.TemporaryDirectory() as folder:
-        outcome, _ = design(target, Path(folder), Path(folder), seed + 1, 1, quiet)
+    outcome = outcome_of(target, seed + 1)
     (predicted,) = outcome.answers[0].predictions
     wanted = want.value or want.at_least or want.at_most
     yield {"number": number, "family": family.cavity, "want": want.text(), "wanted": wanted, "low": predicted.low,
@@ -174,7 +178,7 @@ def direction(count: int) -> Iterator[dict[str, object]]:
     want = Want(friction="static", pressure_kPa=5.0, direction="x", over="y", best="largest")
     target = target_of([want], (family,))
     space = Space(family, 0)
-    config = on_mesh(SimConfig(duration_peaks=2.0, cavity_shape="exact"), "coarse")
+    config = on_mesh(BASE, "coarse")
     with tempfile.TemporaryDirectory() as folder:
         outcome, _ = design(target, Path(folder), Path(folder), SEED, 1, quiet)
         all_rounds = Rounds([space], responses(target), Path(folder), SEED, 1)
@@ -306,7 +310,7 @@ def said_of_loops(rows: pd.DataFrame) -> str:
 
 def reach() -> None:
     """The most likely share and reach of each change of the model, static and sliding at 10 kPa."""
-    base = on_mesh(SimConfig(duration_peaks=2.0, cavity_shape="exact"), "coarse")
+    base = on_mesh(BASE, "coarse")
     changed = {
         "none": base, "half the shear stiffness": base.with_(shear_factor=0.5),
         "elastic contact": base.with_(contact_stiffness_Pa_per_m=3e10),

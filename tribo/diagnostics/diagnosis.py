@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.diagnostics.candidates import LIKELY, Named, best_beyond_chance, name_causes, weigh, weights_of
+from tribo.diagnostics.candidates import LIKELY, NO_CHANGE, Named, best_beyond_chance, name_causes, weigh, weights_of
 from tribo.diagnostics.conclusion import conclude, exclusions
 from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
 from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
@@ -161,7 +161,7 @@ def _a_cause_instead(
         return False
     session = session_of(moving.setup.observations.conditions)
     change = effect_of(best.fit.setup, best.fit.law, best.acting, best.values)
-    if session.max() > 0 and all(np.ptp(change[session == k], axis=0).max() < 1e-9 for k in np.unique(session)):
+    if session.max() > 0 and all(np.ptp(change[session == k], axis=0).max() < NO_CHANGE for k in np.unique(session)):
         return False
     return fit(moving.setup, best.fit.acting, start=moving).score <= best.fit.score + offset + LIKELY
 

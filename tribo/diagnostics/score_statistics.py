@@ -371,8 +371,7 @@ def gaps_in(o: Observations) -> dict[str, np.ndarray]:
         "speed_mm_s": c.recorded("speed_m_s"), "hold_s": c.recorded("hold_s"),
     }  # fmt: skip
     missing = {name: ~np.isfinite(values) for name, values in numbers.items()}
-    for name, column in c.columns.items():
-        missing[name] = c.gaps[name].missing if name in c.gaps else (column == "") | c.told_names.get(name, False)
+    missing |= {name: c.not_recorded(name) for name in c.columns}
     return {name: gaps for name, gaps in missing.items() if gaps.any() and not gaps.all()}
 
 

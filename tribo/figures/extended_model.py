@@ -160,8 +160,7 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     x, names = _abscissa(found)
     acts = law.weight(c) != 0
     for name in law.columns:
-        unknown = c.gaps[name].missing if name in c.gaps else c.columns[name] == "" if name in c.columns else False
-        acts = acts & ~np.asarray(unknown)
+        acts = acts & ~c.not_recorded(name)
     parts = []
     for k in (k for k, regime in enumerate(REGIMES) if law.regime in (regime, "both")):
         course = change[acts, k] - change[acts, k].mean()

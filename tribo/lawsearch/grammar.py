@@ -292,8 +292,7 @@ def column_values(c: Conditions, name: str) -> FloatArray:
 def recorded_values(c: Conditions, name: str) -> FloatArray:
     """The recorded values of a column of numbers, (values,)."""
     values = column_values(c, name)
-    known = np.isfinite(values)
-    return values[known & ~c.gaps[name].missing] if name in c.gaps else values[known]
+    return values[np.isfinite(values) & ~c.not_recorded(name)]
 
 
 DAY_H = 24.0

@@ -352,9 +352,7 @@ def levels_of_law(law: WrittenLaw, c: Conditions) -> Shape | None:
     if others or column in PRESSURES:
         return None
     acts = law.weight(c) != 0.0
-    there = column_values(c, column)
-    if column in c.gaps:
-        there = np.where(c.gaps[column].missing, np.nan, there)
+    there = np.where(c.not_recorded(column), np.nan, column_values(c, column))
     numbers = np.unique(there[acts & np.isfinite(there)]).tolist()
     values: list[float | str] = [*numbers] if numbers else [*levels_of(c.columns[column][acts])]
     if not 2 <= len(values) <= MOST_VALUES:

@@ -158,7 +158,16 @@ class Conditions:
     def recorded(self, name: str) -> FloatArray:
         """A column of numbers by the name of its field, (n,), NaN where none was recorded."""
         values = np.asarray(getattr(self, name), float)
-        return np.where(self.gaps[name].missing, np.nan, values) if name in self.gaps else values
+        return np.where(self.not_recorded(name), np.nan, values)
+
+    def not_recorded(self, name: str) -> NDArray[np.bool_]:
+        """The tests (n,) without a recorded value of a column, whatever stands in its place; of a column that is always
+        there none."""
+        if name in self.gaps:
+            return self.gaps[name].missing
+        if name in self.columns:
+            return (self.columns[name] == "") | self.told_names.get(name, False)
+        return np.zeros(len(self.normal_load_N), bool)
 
     def present(self, mechanism: str) -> NDArray[np.bool_]:
         """Tests for which this mechanism was not removed, (n,)."""
