@@ -19,7 +19,7 @@ from tribo.diagnostics import (
     weighing_table,
 )
 from tribo.diagnostics.candidates import CauseCandidate, Named, weigh
-from tribo.diagnostics.model import PATTERN, SPECIMEN_DRIFT, Acting, candidates, effect_of
+from tribo.diagnostics.model import OF_PATTERNS, SPECIMEN_DRIFT, Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.planning import (
     PAPER_LAW,
@@ -272,7 +272,7 @@ def test_a_cause_that_nothing_measures_or_removes_is_narrowed_at_loads_beyond_th
 def test_a_cause_that_pulls_of_any_number_do_not_narrow_is_tested_with_what_was_held_fixed() -> None:
     cause = named_alone("edge_adhesion", 0.1, 0.5)
     sizes = cause.fit.noise.sizes.copy()
-    sizes[PATTERN : PATTERN + 2] = 3.0  # the model is known to be three times as wrong about patterns as it says
+    sizes[list(OF_PATTERNS)] = 3.0  # the model is known to be three times as wrong about patterns as it says
     test = settling_test(replace(cause, fit=replace(cause.fit, noise=replace(cause.fit.noise, sizes=sizes))))
     assert test is not None
     assert test.kind == "vary what was fixed"

@@ -18,7 +18,7 @@ from figures.against_verdict import contradictions
 from figures.test_figures import collisions
 from tribo.diagnostics import Diagnosis
 from tribo.diagnostics.fit import fit, residual_on_flat
-from tribo.diagnostics.model import PATTERN
+from tribo.diagnostics.model import OF_PATTERNS
 from tribo.diagnostics.verdict import Layer, Misfit
 from tribo.figures import evidence, extended_model, misfit, residuals, style
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
@@ -220,7 +220,7 @@ def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_camp
     for factor in (1.0, 10.0):
         precision = np.where(patterned, factor**-2.0, f.precision)
         sizes = f.noise.sizes.copy()
-        sizes[PATTERN : PATTERN + 2] = factor
+        sizes[list(OF_PATTERNS)] = factor
         wrong = replace(f, noise=replace(f.noise, sizes=sizes), precision=precision)
         wrong_in = replace(nothing, baseline=wrong)
         found.append(residuals.variance_of_mean(wrong_in, np.array([1.0, 0.0]), sample, stated=True))

@@ -22,7 +22,7 @@ from tribo.diagnostics.model import (
     DRIFT,
     FIXED,
     N_LAW,
-    PATTERN,
+    OF_PATTERNS,
     SESSION,
     SPECIMEN_DRIFT,
     Acting,
@@ -87,7 +87,7 @@ def over_pattern_error(f: ModelFit) -> tuple[FloatArray, list[ModelFit]]:
     """The fit at several sizes of the pattern error, and how likely each makes the campaign, adding to one."""
     fits = [with_pattern_error(f, factor) for factor in f.noise.pattern * np.exp(PATTERN_STEPS)]
     log_weight = np.array([g.score + _log_freedom(g) for g in fits])
-    for group in (PATTERN, PATTERN + 1):
+    for group in OF_PATTERNS:
         log_weight += log_size_prior(group, f.noise.sizes[group] * np.exp(PATTERN_STEPS))
     weight = np.exp(log_weight - log_weight.max())
     return weight / weight.sum(), fits

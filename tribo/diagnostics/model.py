@@ -32,8 +32,11 @@ WITHIN_MEASURED = 3.0  # standard uncertainties: one measurement in 400 lies fur
 LAW_SCALE = np.array([1.0, 5.0, 1.0, 5.0])
 LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 100.0, 1000.0]))
 # Groups of random effects that share one size, each in the mean of both regimes and in their difference: gain and
-# slope of the specimens, the patterns, the drift of each specimen along its pulls, the sessions, the series.
-GAIN, SLOPE, PATTERN, SPECIMEN_DRIFT, SESSION, DRIFT = 0, 2, 4, 6, 8, 10
+# slope of the specimens, the drift of each along its pulls, the sessions, the series. The patterns have three: what
+# their errors have in common in both regimes, and what each regime has of its own.
+GAIN, SLOPE, PATTERN, SPECIMEN_DRIFT, SESSION, DRIFT = 0, 2, 4, 7, 9, 11
+OF_PATTERNS = (PATTERN, PATTERN + 1, PATTERN + 2)
+COMMON_SHARE = 0.5  # of the smaller variance that the predictor states: what is expected to be common to both regimes
 ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated
 EVERY = -1  # in place of a specimen: all tests
@@ -80,9 +83,9 @@ class Setup:
     columns of its random effects, without the zeros of all specimens that a test was not made on; ``shared`` (n, 2, c)
     are those that tests of several specimens show. A vector of all q effects holds those of the specimens one after the
     other, then the shared ones. The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
-    (GAIN and so on, plus one for the difference of the regimes), or ``unit[j]`` itself where the group is FIXED.
-    ``scatter`` (n, k) holds what the repeats may depend on: the sample, and the logarithm of the force. ``first_law``
-    (4,) is a first guess of the flat law.
+    (GAIN and so on, plus one for the difference of the regimes; of patterns, plus one for static and two for sliding
+    friction alone), or ``unit[j]`` itself where the group is FIXED. ``scatter`` (n, k) holds what the repeats may
+    depend on: the sample, and the logarithm of the force. ``first_law`` (4,) is a first guess of the flat law.
     """
 
     observations: Observations
@@ -106,7 +109,7 @@ class Setup:
     @property
     def of_patterns(self) -> NDArray[np.bool_]:
         """The random effects that are errors of the model about patterns, (q,)."""
-        return (self.group == PATTERN) | (self.group == PATTERN + 1)
+        return np.isin(self.group, OF_PATTERNS)
 
     @property
     def n_effects(self) -> int:
@@ -175,9 +178,9 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
     """Random effects in both regimes: gain, slope and drift of a specimen; offset, slope and curve of a pattern; the
     gain of a session; the drift of the series.
 
-    How much the error about a pattern has in common in both regimes is learnt from the campaign. The measured patterns
-    of the paper are off from the model by alike factors in both (correlation 0.84 to 0.97 over 3 to 25 kPa); readings
-    and meshes of the model itself often move them apart.
+    The error about a pattern is a factor common to both regimes and one of each regime, and the campaign tells the size
+    of all three. The measured patterns of the paper are off from the model by alike factors in both (correlation 0.84
+    to 0.97 over 3 to 25 kPa); readings and meshes of the model itself often move them apart.
     """
     o, c = observations, observations.conditions
     log_p = np.log(c.pressure_Pa)
@@ -194,11 +197,13 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
         error = predictor.error[sample]
         sized = ((error.offset, np.ones(o.n)), (error.slope, log_p), (error.curve, log_p**2 - np.mean(log_p**2)))
         for sizes, shape in sized if min(error.offset) > 0 else ():
-            unit = float(np.sqrt(np.mean(np.square(sizes))))
-            for k, regimes in enumerate((ALIKE_IN_BOTH, APART)):
-                columns.append(((c.sample == sample) * shape)[:, None] * regimes * np.array(sizes) / unit)
-                units.append(unit)
-                groups.append(PATTERN + k)
+            common = COMMON_SHARE * min(sizes) ** 2
+            parts = ((1.0, 1.0), common), ((1.0, 0.0), sizes[0] ** 2 - common), ((0.0, 1.0), sizes[1] ** 2 - common)
+            for group, (regimes, variance) in zip(OF_PATTERNS, parts, strict=True):
+                if variance > 0.0:
+                    columns.append(((c.sample == sample) * shape)[:, None] * np.array(regimes))
+                    units.append(float(np.sqrt(variance)))
+                    groups.append(group)
     for course, unit, group in (*((s, 1.0, SESSION) for s in sessions(c)), *((s, u, DRIFT) for s, u in walks(c))):
         for k, regimes in enumerate((ALIKE_IN_BOTH, APART)):
             columns.append(course[:, None] * regimes)

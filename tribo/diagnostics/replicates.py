@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.model import GAIN, PATTERN, SPECIMEN_DRIFT, Setup
+from tribo.diagnostics.model import GAIN, OF_PATTERNS, PATTERN, SPECIMEN_DRIFT, Setup
 from tribo.diagnostics.normal_equations import Inverse, ModelColumns, Normal, Sides, Weighted
 from tribo.diagnostics.scatter import (
     SIZE_PRIORS,
@@ -30,14 +30,14 @@ from tribo.display import displayed
 from tribo.records import FloatArray
 
 ITERATIONS = 4
-# The noise of every replicate: of the repeats (r, 2, 2), what they depend on, (r, k), and of the random effects (r, 12)
+# The noise of every replicate: of the repeats (r, 2, 2), what they depend on, (r, k), and of the random effects (r, 13)
 RandomSizes = tuple[FloatArray, FloatArray, FloatArray]
 # Of the logarithms of the sizes of all groups: what a contrast explains of the patterns makes their error smaller, and
 # what it explains of a specimen, or of the course of the series, makes the spread of these smaller. The step OF_SEVERAL
 # is for what several specimens share, such as a lot: one specimen that differs belongs to their spread.
 OF_SEVERAL = 3
 SIZE_STEPS = np.zeros((6, len(SIZE_PRIORS)))
-SIZE_STEPS[1, PATTERN : PATTERN + 2] = -0.7
+SIZE_STEPS[1, OF_PATTERNS] = -0.7
 SIZE_STEPS[2, :PATTERN] = -0.7
 SIZE_STEPS[OF_SEVERAL, GAIN] = -1.0
 SIZE_STEPS[4, SPECIMEN_DRIFT:] = -0.7
@@ -65,7 +65,7 @@ def replicate_weights(inverse: FloatArray, left: FloatArray, tail: float) -> Flo
 
 
 def log_priors(s: Setup, sizes: FloatArray, steps: FloatArray) -> FloatArray:
-    """Log density of sizes (r, 12) after each of ``steps`` (steps, 12) of their logarithms, (steps, r)."""
+    """Log density of sizes (r, 13) after each of ``steps`` (steps, 13) of their logarithms, (steps, r)."""
     there = [group for group in range(len(SIZE_PRIORS)) if group in s.group]
     each = [sum(log_size_prior(g, sizes[:, g] * np.exp(step[g])) for g in there) for step in steps]
     return np.array(each).reshape(len(steps), -1)

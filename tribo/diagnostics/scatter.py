@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.model import FIXED, PATTERN, SPECIMEN_DRIFT, Setup
+from tribo.diagnostics.model import FIXED, OF_PATTERNS, SPECIMEN_DRIFT, Setup
 from tribo.display import displayed
 from tribo.records import FloatArray
 
@@ -21,7 +21,7 @@ from tribo.records import FloatArray
 SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.01, 2.0), (1.0, 1.0)
 NUISANCE_PRIOR = (0.005, 1.0)
 SIZE_PRIORS = np.array(
-    [prior for prior in (SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR, *(3 * [NUISANCE_PRIOR])) for _ in range(2)]
+    [*(2 * [SPECIMEN_PRIOR]), *(2 * [SLOPE_PRIOR]), *(3 * [PATTERN_PRIOR]), *(6 * [NUISANCE_PRIOR])]
 )
 FIRST_NUISANCE = 0.03  # size from which the estimation of each of the last six starts
 REPEAT_PRIOR = (0.08, 4.0)
@@ -32,7 +32,7 @@ SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 @displayed()
 @dataclass(frozen=True)
 class Noise:
-    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance, and ``sizes`` (12,) of the
+    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance, and ``sizes`` (13,) of the
     groups of random effects, in the order of :mod:`tribo.diagnostics.model`.
 
     Those of the patterns are factors on the error that the predictor states. The standard deviation of the
@@ -48,7 +48,7 @@ class Noise:
     @property
     def pattern(self) -> float:
         """The factor on the error of the patterns, over both regimes."""
-        return float(np.sqrt(np.mean(self.sizes[PATTERN : PATTERN + 2] ** 2)))
+        return float(np.sqrt(np.mean(self.sizes[list(OF_PATTERNS)] ** 2)))
 
     def per_test(self, s: Setup) -> FloatArray:
         """Covariance of the repeats of every test, (n, 2, 2)."""
@@ -96,13 +96,13 @@ def log_prior(s: Setup, noise: Noise) -> float:
 
 
 def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
-    """Standard deviation of every random effect for sizes (..., 12), shape (..., q)."""
+    """Standard deviation of every random effect for sizes (..., 13), shape (..., q)."""
     known = np.ones((*sizes.shape[:-1], 1))
     return np.asarray(s.unit * np.concatenate([sizes, known], axis=-1)[..., s.group])
 
 
 def updated_sizes(s: Setup, sizes: FloatArray, effects: FloatArray, variance: FloatArray) -> FloatArray:
-    """Sizes (..., 12) from predicted effects (..., q) and their variances (..., q)."""
+    """Sizes (..., 13) from predicted effects (..., q) and their variances (..., q)."""
     known = 1.0 - variance / prior_sd(s, sizes) ** 2
     squares = (effects / s.unit) ** 2
     updated = sizes.copy()
