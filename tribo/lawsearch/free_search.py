@@ -9,11 +9,12 @@ chance gives the best of all is seen in campaigns that the model makes itself.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from tribo.diagnostics.fit import ModelFit
+from tribo.diagnostics.fit import ModelFit, whitened
 from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of
 from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, T, WrittenLaw, scopes_of
 from tribo.lawsearch.scoring import Projection, effects_of, terms_of
@@ -22,8 +23,10 @@ from tribo.records import FloatArray
 
 OF_SERIES = {"run_order", "specimen_run", "elapsed_s", "clock_h"}  # days, drift and run-in follow these
 MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a meaning of their own come first
-NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25])  # variance that a law leaves, of that before
+NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.15])  # variance that a law leaves where it acts, of that before
 DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface
+OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts less
+LEAST = 0.1  # of the squared distance that is expected, in proportion to which a law leaves noise
 
 
 class FreeSearch:
@@ -45,13 +48,14 @@ class FreeSearch:
         self, model: ModelFit, scopes: Sequence[WrittenLaw], cost: FloatArray, columns: Sequence[tuple[str, ...]]
     ) -> None:
         c = model.setup.observations.conditions
-        self.model, self.scopes, self.columns = model, tuple(scopes), tuple(columns)
+        # without the law, the tests where it does most lie far off; all but outliers count alike
+        self.model = replace(model, weight=np.minimum(model.weight / OUTLIER, 1.0))
+        self.scopes, self.columns = tuple(scopes), tuple(columns)
         names = {name for each in columns for name in each}
         beside = max(len(names) - 1, 1)
         self.cost = np.array([np.log(beside) if len(each) > 1 else 0.0 for each in columns])[:, None] + cost
         self.courses = _principal_courses(c, columns)
-        self.projected = Projection(model, model.residual[None])
-        self.freedom = float(np.sum(self.projected.left**2))  # squares of one on average, as the noise was estimated
+        self.projected = Projection(self.model, model.residual[None])
         effects = effects_of(scopes, c, terms_of(model))
         factor = self.projected.factor
         # of every scope, what multiplies a course in the whitened rows, static and sliding (scopes, 2, n)
@@ -60,6 +64,7 @@ class FreeSearch:
              factor[:, 1, 0] * effects[:, :, 0] + factor[:, 1, 1] * effects[:, :, 1]], axis=1,
         )  # fmt: skip
         self.spectra = [self._spectra(rows) for rows in self.rows]
+        self.acts_on = np.any(self.rows != 0.0, axis=1)  # which tests, (scopes, n)
 
     def _spectra(self, rows: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Of each curve and surface in one scope, the information along its principal directions (k,), and these
@@ -86,29 +91,39 @@ class FreeSearch:
         (r, n, 2) of ln T, (r, columns, scopes).
 
         What a law explains is not noise: each is judged at the noise that it leaves, in proportion to that of the
-        model.
+        model, on the samples where it acts.
         """
         left = Projection(self.model, residual).left
-        squares, left = np.sum(left**2, axis=0), left.reshape(2, self.projected.n, -1)
+        free = 2.0 * self.acts_on.sum(axis=1)
+        beyond = np.maximum(self._distances(residual, left) / free[:, None], LEAST)
+        left = left.reshape(2, self.projected.n, -1)
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
         for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
             pull = np.einsum("in,inr->nr", rows, left)
             for f, (along, courses) in enumerate(spectra):
-                found[:, f, g] = self._evidence(along, (courses.T @ pull) ** 2, squares)
+                found[:, f, g] = _evidence(along, (courses.T @ pull) ** 2 / beyond[g], free[g])
         return found - self.cost
 
-    def _evidence(self, along: FloatArray, pulls: FloatArray, squares: FloatArray) -> FloatArray:
-        """Log marginal likelihood (r,) from the information along (k,), the squared pulls (k, r) and the whole squares
-        (r,): averaged over sizes, at the likeliest noise."""
-        free, noise = self.freedom, np.repeat(NOISES, len(SIZES))
-        variance = np.tile(SIZES**2, len(NOISES))
-        informed = 1.0 + (variance / noise)[:, None] * along  # (noises sizes, k)
-        explained = (variance / noise**2)[:, None] / informed @ pulls * (free / squares)
-        lost = np.sum(np.log(informed), axis=1) + free * (np.log(noise) + 1.0 / noise - 1.0)
-        each = (0.5 * (explained - lost[:, None])).reshape(len(NOISES), len(SIZES), -1)
-        best = each.max(axis=1, keepdims=True)
-        mean = best[:, 0] + np.log(np.mean(np.exp(each - best), axis=1))
-        return np.asarray(mean.max(axis=0))
+    def _distances(self, residual: FloatArray, left: FloatArray) -> FloatArray:
+        """Squared distances of residuals (r, n, 2) from none over the tests on which each scope acts, (scopes, r), by
+        the covariance of noise and random effects; ``left`` (2n, r) is what these leave."""
+        whole = whitened(self.projected.factor, residual.transpose(1, 2, 0))
+        each = np.sum((whole * left).reshape(2, self.projected.n, -1), axis=0)
+        return np.asarray(self.acts_on @ each)
+
+
+def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:
+    """Log marginal likelihood (r,) from the information along (k,) and the squared pulls (k, r), at noise that ``free``
+    numbers tell of: averaged over sizes, at the likeliest noise."""
+    noise = np.repeat(NOISES, len(SIZES))
+    variance = np.tile(SIZES**2, len(NOISES))
+    informed = 1.0 + (variance / noise)[:, None] * along  # (noises sizes, k)
+    explained = (variance / noise**2)[:, None] / informed @ pulls
+    lost = np.sum(np.log(informed), axis=1) + free * (np.log(noise) + 1.0 / noise - 1.0)
+    each = (0.5 * (explained - lost[:, None])).reshape(len(NOISES), len(SIZES), -1)
+    best = each.max(axis=1, keepdims=True)
+    mean = best[:, 0] + np.log(np.mean(np.exp(each - best), axis=1))
+    return np.asarray(mean.max(axis=0))
 
 
 def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> list[FloatArray]:
