@@ -6,6 +6,7 @@ The campaign goes the way of ``tribo diagnose``: causes, laws of what they leave
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -83,7 +84,7 @@ def values_at_levels(d: Diagnosis, bench: Any, column: str, change: np.ndarray) 
     told = [law for law in (d.laws.laws if d.laws else ()) if law.law.columns == (known_as,)]
     found: list[list[Any]] = []
     for law in told[:1]:
-        true, low, high, acts = hidden_and_band(law, change)
+        true, low, high, acts = hidden_and_band([law], change)
         for level in np.unique(bench.column(column)):
             here = bench.column(column) == level
             for k, regime in enumerate(("static", "sliding")):
@@ -94,18 +95,23 @@ def values_at_levels(d: Diagnosis, bench: Any, column: str, change: np.ndarray) 
     return found
 
 
-def hidden_and_band(law: FoundLaw, change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The hidden change beyond what flat law and patterns can absorb, both ends of the 90 % band of a law, and where it
-    acts; each (n, 2)."""
-    c = law.model.setup.observations.conditions
-    return centred(change, c, terms_of(law.model)[LOAD_TERM]), law.band[1], law.band[2], acts_of_law(law)
+def hidden_and_band(
+    laws: Sequence[FoundLaw], change: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The hidden change beyond what flat law and patterns can absorb, both ends of the 90 % band of what laws change
+    together, and where one of them acts; each (n, 2)."""
+    model = laws[-1].model
+    true = centred(change, model.setup.observations.conditions, terms_of(model)[LOAD_TERM])
+    value = sum(law.band[0] for law in laws)
+    below, above = (np.sqrt(sum((law.band[end] - law.band[0]) ** 2 for law in laws)) for end in (1, 2))
+    return true, value - below, value + above, np.any([acts_of_law(law) for law in laws], axis=0)
 
 
-def band_of_first_law(d: Diagnosis, change: np.ndarray) -> Row:
-    """Share of the tests at which the 90 % band of the first law holds the hidden change, and its mean half width."""
+def band_of_laws(d: Diagnosis, change: np.ndarray) -> Row:
+    """Share of the tests at which the 90 % band of all laws holds the hidden change, and its mean half width."""
     if d.laws is None or not d.laws.laws:
         return {}
-    true, low, high, acts = hidden_and_band(d.laws.laws[0], change)
+    true, low, high, acts = hidden_and_band(d.laws.laws, change)
     either = (change != 0) | acts
     held = ((low <= true) & (true <= high))[either].mean()
     return {"band": round(float(held), 4), "band_width": round(float((0.5 * (high - low))[either].mean()), 4)}

@@ -30,7 +30,7 @@ from laboratories.nuisance import Nuisance, draw_nuisance, mixture
 from laboratories.observer import Observer
 from laboratories.one_value import SIZES, hide_one_value
 from laboratories.simple_laws import COLUMNS as SIMPLE_COLUMNS, FORMS, hide_simple_law
-from laboratory_answers import Row, answer, band_of_first_law, diagnosed, errors_left_out, values_at_levels
+from laboratory_answers import Row, answer, band_of_laws, diagnosed, errors_left_out, values_at_levels
 from run_lines import read_rows
 
 from tribo.diagnostics.diagnosis import Diagnosis
@@ -187,7 +187,7 @@ def disturbed_law_row(piece: Piece) -> Row:
     made = make(piece.seed, laboratory, nuisance, hide_free_law(piece.seed, laboratory, piece.what["class"], asked))
     observer = Observer(bare_bench(piece.seed, laboratory), laboratory, nuisance)
     row, d = with_answer(piece, made)
-    return row | {"strength": round(observer.strength(made.change), 3), **band_of_first_law(d, made.change)}
+    return row | {"strength": round(observer.strength(made.change), 3), **band_of_laws(d, made.change)}
 
 
 # gaps
@@ -223,7 +223,7 @@ def free_law_row(piece: Piece) -> Row:
     d = diagnosed(handed_over(made.bench, piece.seed, FURTHER, searched), piece.seed)
     errors = errors_left_out(d, handed_over(made.bench, piece.seed), made.change, ~searched)
     row = {"truth": made.truth, "design": design_row(made), **answer(d.verdict)}
-    return row | errors | band_of_first_law(d, made.change[searched])
+    return row | errors | band_of_laws(d, made.change[searched])
 
 
 # sizes

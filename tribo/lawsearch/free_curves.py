@@ -122,7 +122,7 @@ def likely(shapes: Sequence[Shape]) -> list[FloatArray]:
 
 
 def fitted_curve(
-    without: ModelFit, scope: tuple[WrittenLaw, FloatArray], informed: float, formula: Shape | None = None
+    without: ModelFit, scope: tuple[WrittenLaw, FloatArray], informed: float, formula: Sequence[Shape] = ()
 ) -> FreeCurve:
     """The curve or surface that a campaign tells of, ``without`` being its fit without the law.
 
@@ -135,16 +135,16 @@ def fitted_curve(
         every test.
     informed : float
         Of the information in the weighted normal equations, what a pull really tells.
-    formula : Shape, optional
-        The course that the curve is added to.
+    formula : sequence of Shape, optional
+        The course, a product of these, that the curve or surface is added to.
     """
     law, effects = scope
     c = without.setup.observations.conditions
     courses = at_knots(law.shapes, c)
     acts = np.abs(law.weight(c))
     courses = courses - acts @ courses / acts.sum()
-    if formula is not None:
-        courses = np.column_stack([formula.of(c), courses])
+    if formula:
+        courses = np.column_stack([np.prod([shape.of(c) for shape in formula], axis=0), courses])
     columns = courses[:, None, :] * effects[:, :, None]
     rows, residual = without.cleared(columns)
     information, pull = rows.T @ rows, rows.T @ residual

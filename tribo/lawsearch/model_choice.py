@@ -128,10 +128,10 @@ class Background:
     def conditions(self) -> Conditions:
         return self.setup.observations.conditions
 
-    def curve(self, scope: WrittenLaw, shape: Shape, formula: Shape | None = None) -> FreeCurve:
-        """The curve in one scope, alone or beside a formula."""
+    def curve(self, scope: WrittenLaw, shapes: tuple[Shape, ...], formula: tuple[Shape, ...] = ()) -> FreeCurve:
+        """The curve or surface in one scope, alone or beside a formula."""
         without = replace(self.without, residual=self.residual)
-        law = replace(scope, shapes=(shape,))
+        law = replace(scope, shapes=shapes)
         return fitted_curve(without, (law, self.effects(scope)[0]), self.informed, formula)
 
     def effects(self, *scopes: WrittenLaw) -> FloatArray:
@@ -164,9 +164,7 @@ class Form:
         return np.asarray(weight / weight.sum())
 
 
-def choose_form(
-    model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, rng: np.random.Generator
-) -> FoundLaw:
+def choose_form(model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, rng: np.random.Generator) -> FoundLaw:
     """The best form at the noise that it leaves, with its parameters, ties and band.
 
     Parameters
@@ -236,9 +234,7 @@ def _with_heights(curve: FreeCurve) -> WrittenLaw:
     return replace(curve.law, shapes=(*first, replace(last, heights=heights)))
 
 
-def _likelier_surface(
-    model: ModelFit, at: Background, law: WrittenLaw, without: Collection[str]
-) -> FreeCurve | None:
+def _likelier_surface(model: ModelFit, at: Background, law: WrittenLaw, without: Collection[str]) -> FreeCurve | None:
     """A surface of two columns where a campaign speaks for it beyond a law of one, or of two as a formula, and where it
     predicts tests that were left out better; None elsewhere."""
     sets = free_columns(at.conditions, without)
@@ -288,7 +284,7 @@ def _likeliest_curve(at: Background, forms: Sequence[Form], grammar: Grammar) ->
         column, *others = form.best.columns
         shape = curve_of(column, at.conditions) if not others else None
         if shape is not None and (column, form.scope) not in tried:
-            tried[column, form.scope] = at.curve(form.scope, shape)
+            tried[column, form.scope] = at.curve(form.scope, (shape,))
     return max(tried.values(), key=lambda curve: curve.evidence - cost[replace(curve.law, shapes=())], default=None)
 
 
@@ -563,9 +559,7 @@ def _amplitudes(at: Background, form: Form) -> list[tuple[FloatArray, FloatArray
     return found
 
 
-def _percent(
-    at: Background, form: Form, parameters: dict[str, Estimate], wider: float
-) -> tuple[float, float, float]:
+def _percent(at: Background, form: Form, parameters: dict[str, Estimate], wider: float) -> tuple[float, float, float]:
     """Change of T (or of the term) from the least to the most of the shape where the law acts fully; 90 % interval.
 
     The interval is averaged over places and widths.
@@ -592,8 +586,8 @@ def _percent(
 def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
     """The mean change by all laws in proportion to their likelihood, with its spread, (3, n, 2).
 
-    No law is exactly of the grammar. A formula of one column has a curve beside it, as large as the campaign leaves
-    open; any other may be wrong by the same share of its own effect as a mechanism.
+    No law is exactly of the grammar. A formula of one column has a curve beside it, one of two a surface, as large as
+    the campaign leaves open; any other may be wrong by the same share of its own effect as a mechanism.
     """
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
@@ -612,10 +606,10 @@ def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
 
 def _change_by_form(at: Background, form: Form, wider: float) -> tuple[FloatArray, FloatArray]:
     """The change of ln T of every test by the laws of a form, and its variance, (n, 2) each."""
-    best = form.best.shapes[0]
-    curve = curve_of(best.column, at.conditions) if len(form.best.shapes) == 1 else None
-    if curve is not None:
-        mean, spread = _beyond_patterns(at, at.curve(form.scope, curve, best))
+    shapes, knots = form.best.shapes, curve_of if len(form.best.shapes) == 1 else knots_of
+    beside = tuple(own for shape in shapes if (own := knots(shape.column, at.conditions)) is not None)
+    if len(beside) == len(shapes):
+        mean, spread = _beyond_patterns(at, at.curve(form.scope, beside, shapes))
         return mean, wider**2 * spread
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
