@@ -156,6 +156,20 @@ def test_the_band_of_a_surface_holds_a_hidden_change_without_jumps(surface: Foun
     assert np.median(surface.band[2] - surface.band[1]) < 0.5 * np.ptp(true)
 
 
+def warm_beside_humid(s: Setup) -> np.ndarray:
+    """Above 23 degrees friction rises with the temperature, the more the more humid it is."""
+    c = s.observations.conditions
+    return (0.08 * np.maximum(c.temperature_C - 23.0, 0.0) * (c.humidity_pct - 49.0) / 6.0)[:, None] * np.ones(2)
+
+
+def test_the_band_of_a_product_of_two_columns_holds_a_hidden_change_that_bends() -> None:
+    model = baseline(made(warm_beside_humid, seed=2, design=DESIGN))
+    (law,) = discover_laws(model, replicates=20).laws
+    assert [shape.kind for shape in law.law.shapes] == ["linear", "linear"]
+    true = centred(warm_beside_humid(model.setup), model.setup.observations.conditions, terms_of(law.model)["load term"])
+    assert ((law.band[1] <= true) & (true <= law.band[2])).mean() > 0.65  # 0.47 without a surface beside it
+
+
 def test_a_surface_is_written_and_read_again_and_holds_where_it_is_at_work(surface: FoundLaw, tmp_path: Path) -> None:
     (tmp_path / "law.toml").write_text(law_text(surface.law, surface.parameters, "two columns"), encoding="utf-8")
     again = read_law(tmp_path / "law.toml")
