@@ -166,7 +166,8 @@ def test_the_band_of_a_product_of_two_columns_holds_a_hidden_change_that_bends()
     model = baseline(made(warm_beside_humid, seed=2, design=DESIGN))
     (law,) = discover_laws(model, replicates=20).laws
     assert [shape.kind for shape in law.law.shapes] == ["linear", "linear"]
-    true = centred(warm_beside_humid(model.setup), model.setup.observations.conditions, terms_of(law.model)["load term"])
+    s = law.model.setup
+    true = centred(warm_beside_humid(s), s.observations.conditions, terms_of(law.model)["load term"])
     assert ((law.band[1] <= true) & (true <= law.band[2])).mean() > 0.65  # 0.47 without a surface beside it
 
 
