@@ -19,6 +19,7 @@ from tribo.design.answer_files import polygons_um, repeat_um
 from tribo.design.rounds import fitted
 from tribo.design.target import Family, Space, read_target
 from tribo.errors import SimulationError
+from tribo.springblock import SimConfig
 from tribo.units import CAMPAIGN_COLUMNS
 
 TARGET = """
@@ -81,6 +82,20 @@ def test_designs_meet_the_target_can_be_made_and_come_with_their_campaign(tmp_pa
     pattern = PatternTable.model_validate(described).pattern("P")
     assert pattern.area_fraction == pytest.approx(answers[0]["area_fraction"])
     assert not list(faults_of_making(pattern, Making(4e-6, 3e-6, 0.5e-6)))
+
+
+def test_every_candidate_can_be_simulated():
+    """Rows of staggered cavities may lie between each other; the model has no such patterns."""
+    family = Family(
+        cavity="rectangle", lattice="staggered", size_x_um=[20, 120], size_y_um=[8, 40], pitch_x_um=[40, 160],
+        pitch_y_um=[20, 80], smallest_wall_um=4,
+    )  # fmt: skip
+    space = Space(family, 0)
+    for lengths in space.candidates(200, 1):
+        SimConfig(sample="P", pattern=space.pattern(lengths), cavity_shape="exact").check()
+    assert "25 um wide and 24.5 um apart along y" in space.fault(
+        {"size_x_um": 20.0, "size_y_um": 25.0, "pitch_x_um": 80.0, "pitch_y_um": 24.5}
+    )
 
 
 @pytest.mark.slow

@@ -250,8 +250,13 @@ class Space:
         return Pattern(name, f.cavity, size, (px, py), staggered, None, f.feature, hexagonal)
 
     def fault(self, lengths_um: dict[str, float]) -> str:
-        """Why these lengths cannot be made; empty where they can."""
-        return next(faults_of_making(self.pattern(lengths_um), self.making), "")
+        """Why these lengths cannot be made, or not be simulated; empty where they can."""
+        pattern = self.pattern(lengths_um)
+        if pattern.size_m and pattern.pitch_m and not pattern.is_drawn:
+            for axis, size, pitch in zip("xy", pattern.size_m, pattern.pitch_m, strict=True):
+                if size >= pitch:
+                    return f"the cavities are {size / _UM:g} um wide and {pitch / _UM:g} um apart along {axis}"
+        return next(faults_of_making(pattern, self.making), "")
 
     def at(self, lengths_um: dict[str, float]) -> FloatArray:
         """The point of the cube of these lengths, and their area fraction: the inputs of a surrogate."""
