@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.image import imread
 
 from tribo.campaign.description import PatternTable
 from tribo.campaign.geometry import Making, faults_of_making
@@ -19,6 +21,7 @@ from tribo.design.answer_files import polygons_um, repeat_um
 from tribo.design.rounds import fitted
 from tribo.design.target import Family, Space, read_target
 from tribo.errors import SimulationError
+from tribo.records import Pattern
 from tribo.springblock import SimConfig
 from tribo.units import CAMPAIGN_COLUMNS
 
@@ -96,6 +99,14 @@ def test_every_candidate_can_be_simulated():
     assert "25 um wide and 24.5 um apart along y" in space.fault(
         {"size_x_um": 20.0, "size_y_um": 25.0, "pitch_x_um": 80.0, "pitch_y_um": 24.5}
     )
+
+
+@pytest.mark.parametrize("feature", ["hole", "pillar"])
+@pytest.mark.parametrize("cavity", ["circle", "rectangle", "ridge", "chevron"])
+def test_the_picture_of_a_mask_has_the_area_fraction_of_its_pattern(cavity: str, feature: str):
+    pattern = Pattern("P", cavity, (12e-6, 9e-6), (40e-6, 25e-6), True, None, feature)
+    white = imread(io.BytesIO(answer_files.png(pattern)), format="png")[..., 0]
+    assert white.mean() == pytest.approx(pattern.area_fraction, abs=2e-3)
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from tribo.design.target import Space, Target
 from tribo.files import bytes_of, write_bytes
 from tribo.records import FloatArray, Pattern
 from tribo.springblock.config import SimConfig
-from tribo.springblock.lattice import touching_share
+from tribo.springblock.lattice import distance_of
 from tribo.temporary import temporary_folder
 
 CORNERS = 96  # of a circle: its area is within 0.1 % of the true one
@@ -78,9 +78,10 @@ def png(pattern: Pattern, side_um: float = 200.0) -> bytes:
     """A square of the mask, black and white; white touches."""
     from matplotlib.image import imsave
 
-    share = touching_share(pattern, (PNG_PIXELS, PNG_PIXELS), side_um * _UM / PNG_PIXELS, (0, 0))
+    middle = (np.arange(PNG_PIXELS) + 0.5) * side_um * _UM / PNG_PIXELS
+    within = distance_of(pattern)(middle[None, :], middle[:, None]) < 0.0
     data = io.BytesIO()
-    imsave(data, share >= 0.5, cmap="gray", vmin=0, vmax=1, format="png", origin="lower")
+    imsave(data, within == (pattern.feature == "pillar"), cmap="gray", vmin=0, vmax=1, format="png", origin="lower")
     return data.getvalue()
 
 
