@@ -74,7 +74,7 @@ def noise_of(s: Setup, tail: float = NORMAL) -> Noise:
     repeat = np.array([[0.0081, 0.002], [0.002, 0.0049]])
     scatter = np.array([0.3, -0.1, -0.2, -0.15])
     assert len(scatter) == s.scatter.shape[1]
-    sizes = np.array([0.06, 0.03, 0.02, 0.035, 1.7, 1.1, 0.6, 0.021, 0.013, 0.044, 0.026, 0.051, 0.017])
+    sizes = np.array([0.06, 0.03, 0.02, 0.035, 1.7, 1.1, 1.3, 0.021, 0.013, 0.044, 0.026, 0.051, 0.017])
     return Noise(repeat, sizes, scatter, tail)
 
 
@@ -264,7 +264,7 @@ def test_the_density_of_the_sizes_is_a_scaled_inverse_chi_of_each_and_an_inverse
 
 def test_the_sizes_of_a_noise_are_those_it_is_given() -> None:
     noise = noise_of(campaign())
-    assert noise.pattern**2 == pytest.approx((1.7**2 + 1.1**2 + 0.6**2) / 3)
+    assert noise.pattern**2 == pytest.approx((1.7**2 + 1.1**2 + 1.3**2) / 3)
     s = campaign()
     assert prior_sd(s, noise.sizes) ** 2 == pytest.approx(of_effects(s, noise))
     both = prior_sd(s, np.array([noise.sizes, 2 * noise.sizes]))

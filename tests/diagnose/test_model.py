@@ -147,24 +147,29 @@ def test_a_pattern_has_an_offset_a_slope_and_a_curve_in_each_regime_of_the_state
     c, p = s.observations.conditions, s.log_pressure
     shapes = (np.ones_like(p), p, p**2 - np.mean(p**2))
     columns = s.dense[:, :, s.of_patterns] * s.unit[s.of_patterns]
-    assert columns.shape[2] == 18
+    assert columns.shape[2] == 21
     expected = np.zeros((s.observations.n, 2, 2, s.observations.n))
     for sample in ("A", "B", "C"):
         for known, shape in zip(("offset", "slope", "curve"), shapes, strict=True):
             for regime in (0, 1):
                 along = getattr(s.predictor.error[sample], known)[regime] * (c.sample == sample) * shape
                 expected[:, regime, regime] += np.outer(along, along)
+        both = 0.5 * min(s.predictor.error[sample].offset) ** 2 * np.outer(c.sample == sample, c.sample == sample)
+        expected[:, [0, 1], [1, 0]] += both[:, None]
     assert np.einsum("nrk,mtk->nrtm", columns, columns) == pytest.approx(expected)
 
 
-def test_errors_of_a_pattern_move_both_regimes_alike_or_apart() -> None:
+@pytest.mark.parametrize(
+    ("group", "moved"), [(PATTERN, (1.0, 1.0)), (PATTERN + 1, (1.0, 0.0)), (PATTERN + 2, (0.0, 1.0))]
+)
+def test_errors_of_a_pattern_move_both_regimes_by_one_factor_or_one_of_them(
+    group: int, moved: tuple[float, float]
+) -> None:
     s = campaign()
-    for group, sign in ((PATTERN, 1.0), (PATTERN + 1, -1.0)):
-        columns = s.dense[:, :, s.group == group]
-        size = np.array([s.predictor.error["A"].offset])
-        assert columns.shape[2] == 9
-        assert columns[:, 1, 0] * size[0, 0] == pytest.approx(sign * columns[:, 0, 0] * size[0, 1])
-        assert columns[:, 0, 0].any()
+    columns = s.dense[:, :, s.group == group]
+    assert columns.shape[2] == (3 if group == PATTERN else 9)
+    assert columns.any(axis=(0, 2)).tolist() == [m > 0.0 for m in moved]
+    assert columns[:, 0] * moved[1] == pytest.approx(columns[:, 1] * moved[0])
 
 
 def test_repeats_may_depend_on_the_sample_and_on_the_force_the_law_expects() -> None:

@@ -109,7 +109,7 @@ def precision(f: ModelFit) -> np.ndarray:
 
 def test_sizes_are_estimated_anew_in_every_simulated_campaign() -> None:
     """Replicates of a campaign with slopes of 8 % and patterns off by three times: sizes scatter about the fit's."""
-    f = baseline(7, off(3.0, specimen_slope=0.08, specimens=8))
+    f = baseline(7, off(3.0, specimen_slope=0.08, specimens=8, samples=("F", "A", "B", "C", "Sx", "Sy")))
     sizes = refits(f, drawn_residuals(f, np.random.default_rng(2), 60))[0][2]
     assert np.exp(np.mean(np.log(sizes), axis=0)) == pytest.approx(f.noise.sizes, rel=0.25)
     assert np.all(np.std(np.log(sizes), axis=0) > 0.05)

@@ -36,7 +36,7 @@ LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 1
 # their errors have in common in both regimes, and what each regime has of its own.
 GAIN, SLOPE, PATTERN, SPECIMEN_DRIFT, SESSION, DRIFT = 0, 2, 4, 7, 9, 11
 OF_PATTERNS = (PATTERN, PATTERN + 1, PATTERN + 2)
-COMMON_SHARE = 0.5  # of the smaller variance that the predictor states: what is expected to be common to both regimes
+COMMON_SHARE = 0.5  # of the smaller variance of an offset: what is expected to be common to both regimes
 ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated
 EVERY = -1  # in place of a specimen: all tests
@@ -178,9 +178,10 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
     """Random effects in both regimes: gain, slope and drift of a specimen; offset, slope and curve of a pattern; the
     gain of a session; the drift of the series.
 
-    The error about a pattern is a factor common to both regimes and one of each regime, and the campaign tells the size
-    of all three. The measured patterns of the paper are off from the model by alike factors in both (correlation 0.84
-    to 0.97 over 3 to 25 kPa); readings and meshes of the model itself often move them apart.
+    The error about a pattern is a factor common to both regimes, and an offset, a slope and a curve of each regime; the
+    campaign tells the size of all three parts. The measured patterns of the paper are off from the model by alike
+    factors in both (correlation 0.84 to 0.97 over 3 to 25 kPa); readings and meshes of the model itself often move them
+    apart.
     """
     o, c = observations, observations.conditions
     log_p = np.log(c.pressure_Pa)
@@ -195,15 +196,19 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
     units, groups = [1.0] * (len(kinds) * len(names)), [group for _, group in kinds] * len(names)
     for sample in np.unique(c.sample):
         error = predictor.error[sample]
-        sized = ((error.offset, np.ones(o.n)), (error.slope, log_p), (error.curve, log_p**2 - np.mean(log_p**2)))
-        for sizes, shape in sized if min(error.offset) > 0 else ():
-            common = COMMON_SHARE * min(sizes) ** 2
-            parts = ((1.0, 1.0), common), ((1.0, 0.0), sizes[0] ** 2 - common), ((0.0, 1.0), sizes[1] ** 2 - common)
-            for group, (regimes, variance) in zip(OF_PATTERNS, parts, strict=True):
-                if variance > 0.0:
-                    columns.append(((c.sample == sample) * shape)[:, None] * np.array(regimes))
-                    units.append(float(np.sqrt(variance)))
-                    groups.append(group)
+        if min(error.offset) <= 0.0:
+            continue
+        both = COMMON_SHARE * min(error.offset) ** 2
+        offset, slope, curve = (np.square(sizes) for sizes in (error.offset, error.slope, error.curve))
+        level, bent = np.ones(o.n), log_p**2 - np.mean(log_p**2)
+        parts = [(level, (1.0, 1.0), both, PATTERN)]
+        for k, regimes in enumerate(((1.0, 0.0), (0.0, 1.0))):
+            for shape, variance in ((level, offset[k] - both), (log_p, slope[k]), (bent, curve[k])):
+                parts.append((shape, regimes, variance, OF_PATTERNS[1 + k]))
+        for shape, regimes, variance, group in parts:
+            columns.append(((c.sample == sample) * shape)[:, None] * np.array(regimes))
+            units.append(float(np.sqrt(variance)))
+            groups.append(group)
     for course, unit, group in (*((s, 1.0, SESSION) for s in sessions(c)), *((s, u, DRIFT) for s, u in walks(c))):
         for k, regimes in enumerate((ALIKE_IN_BOTH, APART)):
             columns.append(course[:, None] * regimes)
