@@ -14,12 +14,13 @@ from tribo.diagnostics.inference import (
     _log_freedom,
     _score_at,
     intervals,
+    pattern_factor,
     recovered,
     standard_errors,
     understated,
     with_pattern_error,
 )
-from tribo.diagnostics.model import FIXED, PATTERN, candidates
+from tribo.diagnostics.model import FIXED, OF_PATTERNS, candidates
 
 from .test_screen import baseline
 
@@ -66,24 +67,29 @@ def test_the_patterns_of_the_campaign_tell_how_wrong_the_model_is_about_them(fac
 
 def test_the_scale_of_the_pattern_error_is_recovered() -> None:
     """Three patterns, both regimes, off by four times the stated error: the factor is within a third of four."""
-    assert off_by(4.0).noise.pattern == pytest.approx(4.0, rel=0.34)
-    assert off_by(0.5).noise.pattern < 1.0
+    assert pattern_factor(off_by(4.0)) == pytest.approx(4.0, rel=0.34)
+    assert pattern_factor(off_by(0.5)) < 1.0
 
 
-def off_by(factor: float) -> ModelFit:
+def off_by(factor: float, *, alike: bool = False) -> ModelFit:
+    """Off by a factor on the stated error of each regime, or by the same as in static friction in both."""
     f = fitted("edge_adhesion", ("edge_adhesion", 1.0))
     o = f.setup.observations
     off = sum(
-        sign * factor * np.array(f.setup.predictor.error[sample].offset) * (o.conditions.sample == sample)[:, None]
+        sign
+        * factor
+        * np.array(f.setup.predictor.error[sample].offset)[[0, 0] if alike else [0, 1]]
+        * (o.conditions.sample == sample)[:, None]
         for sample, sign in (("A", 1), ("B", -1), ("C", 1))
     )
     return fit(replace(f.setup, observations=replace(o, log_force=o.log_force + off)), f.acting)
 
 
-def test_patterns_that_are_off_alike_in_both_regimes_have_a_larger_error_in_the_mean_than_in_the_difference() -> None:
-    f = off_by(4.0)
-    assert f.noise.sizes[PATTERN] > 2 * f.noise.sizes[PATTERN + 1]
-    assert f.noise.pattern > 1.5
+def test_patterns_that_are_off_by_the_same_factor_in_both_regimes_have_a_larger_error_in_common() -> None:
+    f = off_by(1.25, alike=True)
+    common, *own = f.noise.sizes[list(OF_PATTERNS)]
+    assert common > 2 * max(own)
+    assert pattern_factor(f) > 1.5
 
 
 def test_an_averaged_interval_keeps_to_the_bounds() -> None:
@@ -126,7 +132,7 @@ def test_the_freedom_of_a_fit_is_half_the_log_determinant_of_law_and_mechanisms(
 def test_a_pattern_error_that_is_held_is_no_longer_estimated() -> None:
     f = fitted("temperature", ("temperature", 1.0))
     held, here = with_pattern_error(f, 2.5), f.setup.of_patterns
-    sizes = f.noise.sizes[f.setup.group[here]] / f.noise.pattern
+    sizes = f.noise.sizes[f.setup.group[here]] / pattern_factor(f)
     assert held.setup.unit[here] == pytest.approx(2.5 * sizes * f.setup.unit[here])
     assert np.array_equal(held.setup.unit[~here], f.setup.unit[~here])
     assert (held.setup.group[here] == FIXED).all()

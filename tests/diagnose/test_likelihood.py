@@ -264,7 +264,6 @@ def test_the_density_of_the_sizes_is_a_scaled_inverse_chi_of_each_and_an_inverse
 
 def test_the_sizes_of_a_noise_are_those_it_is_given() -> None:
     noise = noise_of(campaign())
-    assert noise.pattern**2 == pytest.approx((1.7**2 + 1.1**2 + 1.3**2) / 3)
     s = campaign()
     assert prior_sd(s, noise.sizes) ** 2 == pytest.approx(of_effects(s, noise))
     both = prior_sd(s, np.array([noise.sizes, 2 * noise.sizes]))

@@ -154,7 +154,7 @@ def test_a_pattern_has_an_offset_a_slope_and_a_curve_in_each_regime_of_the_state
             for regime in (0, 1):
                 along = getattr(s.predictor.error[sample], known)[regime] * (c.sample == sample) * shape
                 expected[:, regime, regime] += np.outer(along, along)
-        both = 0.5 * min(s.predictor.error[sample].offset) ** 2 * np.outer(c.sample == sample, c.sample == sample)
+        both = 0.25 * min(s.predictor.error[sample].offset) ** 2 * np.outer(c.sample == sample, c.sample == sample)
         expected[:, [0, 1], [1, 0]] += both[:, None]
     assert np.einsum("nrk,mtk->nrtm", columns, columns) == pytest.approx(expected)
 

@@ -85,7 +85,7 @@ def understated(f: ModelFit, index: int) -> FloatArray:
 
 def over_pattern_error(f: ModelFit) -> tuple[FloatArray, list[ModelFit]]:
     """The fit at several sizes of the pattern error, and how likely each makes the campaign, adding to one."""
-    fits = [with_pattern_error(f, factor) for factor in f.noise.pattern * np.exp(PATTERN_STEPS)]
+    fits = [with_pattern_error(f, factor) for factor in pattern_factor(f) * np.exp(PATTERN_STEPS)]
     log_weight = np.array([g.score + _log_freedom(g) for g in fits])
     for group in OF_PATTERNS:
         log_weight += log_size_prior(group, f.noise.sizes[group] * np.exp(PATTERN_STEPS))
@@ -102,11 +102,20 @@ def _log_freedom(f: ModelFit) -> float:
     return float(np.sum(np.log(scale)) + 0.5 * np.linalg.slogdet(correlation)[1])
 
 
+def pattern_factor(f: ModelFit) -> float:
+    """The estimated error of the patterns over what the predictor states, root mean square over tests and regimes."""
+    s = f.setup
+    patterns = np.flatnonzero(s.of_patterns)
+    stated = (s.shared[:, :, patterns - s.of_specimens] * s.unit[patterns]) ** 2
+    there = stated.sum(axis=2) > 0.0
+    return float(np.sqrt(np.mean((stated @ f.noise.sizes[s.group[patterns]] ** 2)[there] / stated.sum(axis=2)[there])))
+
+
 def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
     """The fit with the error of the patterns held at ``factor`` times what the predictor states; what both regimes have
     in common of it stays as it is."""
     s = f.setup
-    sizes = f.noise.sizes[np.maximum(s.group, 0)] * factor / f.noise.pattern
+    sizes = f.noise.sizes[np.maximum(s.group, 0)] * factor / pattern_factor(f)
     unit, group = np.where(s.of_patterns, sizes * s.unit, s.unit), np.where(s.of_patterns, FIXED, s.group)
     held = replace(s, unit=unit, group=group)
     return fit(held, f.acting, start=f, iterations=15)
@@ -199,10 +208,10 @@ def pattern_excess(f: ModelFit) -> tuple[float, float] | None:
     """The estimated error of the model over the stated one, and the chance of such a factor where the true one is at
     most WITHIN (likelihood ratio, one-sided); None where the factor is not larger."""
     s = f.setup
-    if not s.of_patterns.any() or f.noise.pattern <= WITHIN:
+    if not s.of_patterns.any() or (found := pattern_factor(f)) <= WITHIN:
         return None
     ratio = 2.0 * (f.score - with_pattern_error(f, WITHIN).score)
-    return f.noise.pattern, max(0.5 * float(chi2.sf(max(ratio, 0.0), 1)), 1e-12)
+    return found, max(0.5 * float(chi2.sf(max(ratio, 0.0), 1)), 1e-12)
 
 
 def pattern_corrections(f: ModelFit) -> list[Layer]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.model import FIXED, OF_PATTERNS, SPECIMEN_DRIFT, Setup
+from tribo.diagnostics.model import FIXED, SPECIMEN_DRIFT, Setup
 from tribo.display import displayed
 from tribo.records import FloatArray
 
@@ -44,11 +44,6 @@ class Noise:
     sizes: FloatArray
     scatter: FloatArray | None = None
     tail: float = 8.0
-
-    @property
-    def pattern(self) -> float:
-        """The factor on the error of the patterns, over both regimes."""
-        return float(np.sqrt(np.mean(self.sizes[list(OF_PATTERNS)] ** 2)))
 
     def per_test(self, s: Setup) -> FloatArray:
         """Covariance of the repeats of every test, (n, 2, 2)."""
