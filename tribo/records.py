@@ -483,6 +483,13 @@ class Pattern:
         return own or self.feature == "pillar" or self.lattice == "hexagonal"
 
     @property
+    def too_wide_along(self) -> str:
+        """The axes along which cavities that are made of whole blocks leave no wall: "", "x", "y" or "xy"."""
+        if self.size_m is None or self.pitch_m is None or self.is_drawn:
+            return ""
+        return "".join(a for a, size, pitch in zip("xy", self.size_m, self.pitch_m, strict=True) if not size < pitch)
+
+    @property
     def is_flat(self) -> bool:
         """Whether the sample has no cavities."""
         return self.cavity == "none"

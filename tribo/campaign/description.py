@@ -203,7 +203,7 @@ class PatternTable(_Strict):
         if self.cavity == "square" and self.size[0] != self.size[1]:
             raise ValueError("a square has one size_um; for two sizes use cavity = rectangle")
         pattern = self.pattern("")
-        if not pattern.is_drawn and (self.size[0] >= self.pitch[0] or self.size[1] >= self.pitch[1]):
+        if pattern.too_wide_along:
             raise ValueError("the pitch must be larger than the cavity; otherwise cavities touch")
         limited = self.making != Making()
         if (pattern.is_drawn or limited) and (faults := list(faults_of_making(pattern, self.making))):

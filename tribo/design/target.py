@@ -252,10 +252,10 @@ class Space:
     def fault(self, lengths_um: dict[str, float]) -> str:
         """Why these lengths cannot be made, or not be simulated; empty where they can."""
         pattern = self.pattern(lengths_um)
-        if pattern.size_m and pattern.pitch_m and not pattern.is_drawn:
-            for axis, size, pitch in zip("xy", pattern.size_m, pattern.pitch_m, strict=True):
-                if size >= pitch:
-                    return f"the cavities are {size / _UM:g} um wide and {pitch / _UM:g} um apart along {axis}"
+        if (axis := pattern.too_wide_along[:1]) and pattern.size_m and pattern.pitch_m:
+            k = "xy".index(axis)
+            size, pitch = pattern.size_m[k] / _UM, pattern.pitch_m[k] / _UM
+            return f"the cavities are {size:g} um wide and {pitch:g} um apart along {axis}"
         return next(faults_of_making(pattern, self.making), "")
 
     def at(self, lengths_um: dict[str, float]) -> FloatArray:

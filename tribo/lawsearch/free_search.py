@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tribo.diagnostics.fit import ModelFit, whitened
+from tribo.diagnostics.fit import ModelFit
 from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of
 from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, T, WrittenLaw, scopes_of
 from tribo.lawsearch.scoring import Projection, effects_of, terms_of
@@ -93,23 +93,18 @@ class FreeSearch:
         What a law explains is not noise: each is judged at the noise that it leaves, in proportion to that of the
         model, on the samples where it acts.
         """
-        left = Projection(self.model, residual).left
+        projected = Projection(self.model, residual)
+        left = projected.left.reshape(2, projected.n, -1)
+        # squared distances of every test from none, by the covariance of noise and random effects, (n, r)
+        distances = np.sum(projected.right.reshape(left.shape) * left, axis=0)
         free = 2.0 * self.acts_on.sum(axis=1)
-        beyond = np.maximum(self._distances(residual, left) / free[:, None], LEAST)
-        left = left.reshape(2, self.projected.n, -1)
+        beyond = np.maximum(self.acts_on @ distances / free[:, None], LEAST)
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
         for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
             pull = np.einsum("in,inr->nr", rows, left)
             for f, (along, courses) in enumerate(spectra):
                 found[:, f, g] = _evidence(along, (courses.T @ pull) ** 2 / beyond[g], free[g])
         return found - self.cost
-
-    def _distances(self, residual: FloatArray, left: FloatArray) -> FloatArray:
-        """Squared distances of residuals (r, n, 2) from none over the tests on which each scope acts, (scopes, r), by
-        the covariance of noise and random effects; ``left`` (2n, r) is what these leave."""
-        whole = whitened(self.projected.factor, residual.transpose(1, 2, 0))
-        each = np.sum((whole * left).reshape(2, self.projected.n, -1), axis=0)
-        return np.asarray(self.acts_on @ each)
 
 
 def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:

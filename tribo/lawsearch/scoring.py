@@ -137,8 +137,8 @@ class Projection:
     border : array (2n, m)
         Columns whose products with a whitened column are what the model absorbs: of the specimens, each for its own
         tests, and those that tests share.
-    left : array (2n, r)
-        The whitened residual less what the model absorbs of it.
+    right, left : array (2n, r)
+        The whitened residual, and what the model does not absorb of it.
     """
 
     def __init__(self, model: ModelFit, residual: FloatArray) -> None:
@@ -151,8 +151,8 @@ class Projection:
         self.own = (absorbed.own[0, specimen] @ white[:, :, None])[:, :, 0]
         taken = (self.own[:, None] @ absorbed.across[0, specimen])[:, 0]
         self.border = (whitened(self.factor, model.columns.border) - taken) @ absorbed.border[0].T
-        right = whitened(self.factor, residual.transpose(1, 2, 0))
-        self.left = right - self._taken(right)
+        self.right = whitened(self.factor, residual.transpose(1, 2, 0))
+        self.left = self.right - self._taken(self.right)
 
     def _taken(self, white: FloatArray) -> FloatArray:
         """What the model absorbs of whitened columns, (2n, k)."""

@@ -523,7 +523,7 @@ def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
     for axis, size, pitch, width in zip("xy", pattern.size_m, pattern.pitch_m, domain, strict=True):
         if pattern.cavity in ("ridge", "chevron") and axis == "y":
             continue
-        if not (0 < size < pitch) and not pattern.is_drawn:
+        if axis in pattern.too_wide_along or not (size > 0 or pattern.is_drawn):
             yield Problem(
                 "impossible_geometry", f"the cavities are too large for their pitch along {axis}", column="pattern",
                 found=f"{size * 1e6:g} um in {pitch * 1e6:g} um", allowed="0 < size < pitch",
