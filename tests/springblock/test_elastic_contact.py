@@ -78,9 +78,7 @@ def test_stress_beside_an_edge_falls_over_the_elastic_length(kappa: float):
     config = SimConfig(blocks=(320, 3), spacing_m=0.25e-6, thickness_m=5e-6, edges="periodic", angle_deg=90.0)
     stiffness, bond = config.shear_stiffness_N_m, kappa * config.spacing_m**2
     mask = np.arange(320) >= 160
-    lattice = make_lattice(
-        np.tile(mask, (3, 1)), stiffness / config.stiffness_N_m, True, bond / config.stiffness_N_m
-    )
+    lattice = make_lattice(np.tile(mask, (3, 1)), stiffness / config.stiffness_N_m, True, bond / config.stiffness_N_m)
     u = lattice.follow[320:640, 1, 1]  # of the middle row, per slider
     inside = config.spacing_m * math.sqrt(0.5 * config.stiffness_N_m / (stiffness + bond))
     outside = config.spacing_m * math.sqrt(0.5 * config.stiffness_N_m / stiffness)
@@ -125,6 +123,30 @@ def test_contact_grows_rigid_with_its_stiffness():
     rigid = simulate(base).static_friction
     assert peaks[0] > peaks[1] > peaks[2]
     assert peaks[2] == pytest.approx(rigid, rel=0.03)
+
+
+def test_patches_of_friction_are_the_same_on_every_mesh():
+    """Each block of a patch has the coefficients of the one block that it is on the coarse mesh, also at a cut edge."""
+    coarse = SimConfig(blocks=(9, 7), spacing_m=5e-6, friction_patch_m=5e-6, seed=4)
+    fine = coarse.with_(blocks=(17, 14), spacing_m=2.5e-6, thickness_m=5e-6)
+    of_coarse, of_fine = (thresholds_of(c, lattice_of(c)) for c in (coarse, fine))
+    for one, other in ((of_coarse.static_N, of_fine.static_N), (of_coarse.sliding_N, of_fine.sliding_N)):
+        y, x = np.divmod(np.arange(17 * 14), 17)
+        np.testing.assert_allclose(4.0 * other, one[(y // 2) * 9 + x // 2], rtol=1e-12)
+
+
+def test_patches_of_one_block_are_the_draws_of_the_paper():
+    """To the bit, as is the default."""
+    plain = SimConfig(sample="C", blocks=(18, 15), seed=4)
+    patched = plain.with_(friction_patch_m=plain.spacing_m)
+    lattice = lattice_of(plain)
+    assert np.array_equal(thresholds_of(patched, lattice).static_N, thresholds_of(plain, lattice).static_N)
+
+
+@pytest.mark.parametrize("patch_m", [7e-6, 1e-9, -5e-6])
+def test_patches_that_cut_blocks_are_refused(patch_m: float):
+    with pytest.raises(SimulationError, match="friction_patch_m"):
+        SimConfig(friction_patch_m=patch_m).check()
 
 
 @pytest.mark.parametrize(("sample", "pressure_Pa"), [("B", 3e3), ("C", 25e3)])

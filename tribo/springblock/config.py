@@ -84,6 +84,7 @@ OPEN_CHOICES: dict[str, Any] = {
     "sticking": "turned",
     "stick_interval_s": None,
     "contact_stiffness_Pa_per_m": None,
+    "friction_patch_m": None,
     "pulled_edge": None,
     "machine_stiffness_N_per_m": None,
 }
@@ -145,6 +146,9 @@ class SimConfig:
     contact_stiffness_Pa_per_m
         Stiffness kappa of contact per area: a spring kappa l2 binds each contact block to the track and yields at its
         static threshold. None, the reading of the paper, is rigid contact. A stiffer one needs a shorter step.
+    friction_patch_m
+        Side of the squares in which all blocks have one draw of the local friction. None, the reading of the paper, is
+        one draw for each block: a finer mesh then has more draws, hence a weaker weakest one.
     pulled_edge
         "leading" or "trailing": the slider pulls only the row of blocks at that edge, each by K_s. None, the reading of
         the paper, is a slider over all blocks. The row is the one across x or y, whichever is nearer to the pull.
@@ -210,6 +214,7 @@ class SimConfig:
     stick_speed_m_s: float = 2e-4
     stick_interval_s: float | None = None
     contact_stiffness_Pa_per_m: float | None = None
+    friction_patch_m: float | None = None
     pulled_edge: PulledEdge | None = None
     machine_stiffness_N_per_m: float | None = None
     slider_mass_kg: float | None = None
@@ -362,7 +367,8 @@ def _unknown_sample(sample: str) -> Problem:
 _POSITIVE = {
     "stick_speed_m_s", "stick_interval_s", "pressure_Pa", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3",
     "speed_m_s", "shear_factor", "dt_s", "duration_s", "sample_interval_s", "rest_tolerance", "ageing_t0_s",
-    "speed_v0_m_s", "contact_stiffness_Pa_per_m", "machine_stiffness_N_per_m", "slider_mass_kg",
+    "speed_v0_m_s", "contact_stiffness_Pa_per_m", "friction_patch_m", "machine_stiffness_N_per_m",
+    "slider_mass_kg",
 }  # fmt: skip
 _NOT_NEGATIVE = {
     "damping_per_s", "mu_s", "mu_s_sd", "mu_d", "mu_d_sd", "ageing_b", "hold_s", "machine_damping_N_s_per_m",
@@ -403,6 +409,14 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
             yield Problem(
                 "no_machine", "needs the stiffness of the machine", column=name, found=f"{getattr(config, name):g}",
                 allowed="machine_stiffness_N_per_m beside it",
+            )  # fmt: skip
+    patch = config.friction_patch_m
+    if patch is not None and not faulty & {"friction_patch_m", "spacing_m"}:
+        blocks = patch / config.spacing_m
+        if round(blocks) < 1 or abs(blocks - round(blocks)) > 1e-6:
+            yield Problem(
+                "not_whole_blocks", "a patch holds a whole number of blocks", column="friction_patch_m",
+                found=f"{patch * 1e6:g} um", allowed=f"multiples of {config.spacing_m * 1e6:g} um",
             )  # fmt: skip
     if config.pulled_edge is not None and config.edges == "periodic":
         yield Problem(
