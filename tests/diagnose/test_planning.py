@@ -123,7 +123,7 @@ OTHERS = set(MECHANISMS) - PAIR
 
 @cache
 def campaign() -> Ingested:
-    return made(acting("suction", 8e3), seed=4)
+    return made(acting("suction", 2.5e3), seed=4)
 
 
 def with_measured(name: str, value: float, uncertainty: float) -> Ingested:

@@ -15,7 +15,7 @@ import numpy as np
 
 from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import Acting, Target, effect_of, with_free_columns
+from tribo.diagnostics.model import ADHESION, Acting, Target, effect_of, with_free_columns
 from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
 from tribo.display import displayed
@@ -34,6 +34,7 @@ CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart ex
 LIKELY = 4.6  # log likelihood: odds of 100 to 1, the level of a misfit
 ANY_FACTOR = 1.0  # standard deviation of ln T of a day that may differ by any factor
 NO_CHANGE = 1e-9  # of ln T
+BELOW_ZERO = 2.33  # standard errors: one adhesion of zero in a hundred is fitted further below
 IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
 
 
@@ -83,8 +84,19 @@ def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[CauseCand
         judged(start.model, refitted(c.fit, c.fit.acting), c.raw - c.gain) if c.gain > hopeful else c
         for c in tried.values()
     ]
-    standing = [c for c in fitted if c.gain <= hopeful or _more_than_days_differ(start.model, c)]
+    standing = [c for c in fitted if c.gain <= hopeful or _is_possible(start.model, c)]
     return sorted(standing, key=lambda c: -c.gain)
+
+
+def _is_possible(start: ModelFit, c: CauseCandidate) -> bool:
+    return not _adhesion_turns_negative(start, c) and _more_than_days_differ(start, c)
+
+
+def _adhesion_turns_negative(start: ModelFit, c: CauseCandidate) -> bool:
+    """Whether a cause holds only with an adhesion below zero, which no surface has. What the calibration on the flat
+    sample takes up of an offset or a load ends in the adhesion: one that is too large shows there."""
+    sd = np.sqrt(np.diag(c.fit.covariance))[ADHESION]
+    return bool(np.any(c.fit.law[ADHESION] < np.minimum(start.law[ADHESION], 0.0) - BELOW_ZERO * sd))
 
 
 def _more_than_days_differ(start: ModelFit, c: CauseCandidate) -> bool:

@@ -139,6 +139,12 @@ def exclusions(
     return excluded
 
 
+def never_weighed(barred: Sequence[Excluded]) -> list[str]:
+    """Those that cannot explain a misfit. What the errors of the patterns hide cannot be found alone, but a misfit may
+    be of its making: it is weighed, so that nothing that looks alike is named in its place."""
+    return [e.mechanism for e in barred if e.why != "hidden"]
+
+
 def _recorded_in_part(m: Mechanism, conditions: Conditions) -> tuple[str, int, int] | None:
     """The column that a mechanism needs, the number of tests with a value and of all tests, where its gaps cannot be
     filled."""

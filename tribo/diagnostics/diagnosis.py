@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.diagnostics.candidates import LIKELY, NO_CHANGE, Named, best_beyond_chance, name_causes, weigh, weights_of
-from tribo.diagnostics.conclusion import conclude, exclusions
+from tribo.diagnostics.conclusion import conclude, exclusions, never_weighed
 from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
 from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
 from tribo.diagnostics.effect_sizes import percent
@@ -134,7 +134,7 @@ def examine(
         def screen_of(model: ModelFit) -> Screen:
             return screen_left(model, replicates=replicates[1], rng=rng, progress=progress)
 
-        named = name_causes(effects, screened, [e.mechanism for e in barred], level, screen_of)
+        named = name_causes(effects, screened, never_weighed(barred), level, screen_of)
     verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, (level, of_nuisance), rng)
     return Diagnosis(verdict, effects.model, screened, named, share_of_level=share)
 
@@ -153,7 +153,7 @@ def _a_cause_instead(
     ``offset`` raises the score of the fits without days and drift.
     """
     effects, screened, barred = still
-    best = best_beyond_chance(weigh(effects, [e.mechanism for e in barred]), screened, level)
+    best = best_beyond_chance(weigh(effects, never_weighed(barred)), screened, level)
     if best is None:
         return False
     by_drift = moving.score - (effects.model.score + offset)

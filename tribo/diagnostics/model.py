@@ -27,6 +27,7 @@ OF_A_SPECIMEN = 7
 
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
+ADHESION = [1, 3]
 FLOOR_N = 1e-6
 WITHIN_MEASURED = 3.0  # standard uncertainties: one measurement in 400 lies further off
 LAW_SCALE = np.array([1.0, 5.0, 1.0, 5.0])

@@ -34,14 +34,16 @@ ITERATIONS = 4
 RandomSizes = tuple[FloatArray, FloatArray, FloatArray]
 # Of the logarithms of the sizes of all groups: what a contrast explains of the patterns makes their error smaller, and
 # what it explains of a specimen, or of the course of the series, makes the spread of these smaller. The step OF_SEVERAL
-# is for what several specimens share, such as a lot: one specimen that differs belongs to their spread.
+# is for what several specimens share, such as a lot: one specimen that differs belongs to their spread. The last step
+# is for what acts alike in both regimes of all patterns, such as suction: it looks like the error common to both.
 OF_SEVERAL = 3
-SIZE_STEPS = np.zeros((6, len(SIZE_PRIORS)))
+SIZE_STEPS = np.zeros((7, len(SIZE_PRIORS)))
 SIZE_STEPS[1, OF_PATTERNS] = -0.7
 SIZE_STEPS[2, :PATTERN] = -0.7
 SIZE_STEPS[OF_SEVERAL, GAIN] = -1.0
 SIZE_STEPS[4, SPECIMEN_DRIFT:] = -0.7
 SIZE_STEPS[5, SPECIMEN_DRIFT:] = -2.0
+SIZE_STEPS[6, PATTERN] = -1.0
 
 
 def fitted_noise(s: Setup, noise: Noise, replicates: int) -> RandomSizes:
