@@ -19,6 +19,7 @@ from scipy.stats import chi2, norm
 from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
 from tribo.diagnostics.fit import ModelFit, fit, fit_without, precision_of
 from tribo.diagnostics.model import (
+    ALIKE_IN_BOTH,
     DRIFT,
     FIXED,
     N_LAW,
@@ -30,7 +31,7 @@ from tribo.diagnostics.model import (
     Target,
 )
 from tribo.diagnostics.normal_equations import Normal, block_cholesky, model_columns
-from tribo.diagnostics.observations import Observations
+from tribo.diagnostics.observations import Observations, along_specimens
 from tribo.diagnostics.replicates import drawn_residuals, refits
 from tribo.diagnostics.scatter import SIZE_PRIORS, Noise, held_still, log_size_prior, prior_sd
 from tribo.diagnostics.verdict import Estimate, Gain, Layer, Nuisance
@@ -285,10 +286,14 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
             ratio = f.score - fit(held, f.acting, start=f, iterations=15).score - offset
             chances[name] = float(chi2.sf(2.0 * max(ratio, 0.0), 2))
     told = {name: p for name, p in chances.items() if p < level}
-    drawn = drawn_effects(f, np.random.default_rng(0)) if told else np.zeros((0, s.n_effects))
+    if not told:
+        return []
+    wider = _drifting_in_common(f)
+    drawn, group = drawn_effects(wider, np.random.default_rng(0)), wider.setup.group
     layers = []
     for name, p in told.items():
-        sizes = [_realised(s, np.where(kinds[name], part, 0.0)) for part in np.array_split(drawn, KEPT)]
+        of_kind = np.isin(group, (NUISANCES[name], NUISANCES[name] + 1))
+        sizes = [_realised(wider.setup, np.where(of_kind, part, 0.0)) for part in np.array_split(drawn, KEPT)]
         low, middle, high = 100.0 * np.quantile(np.concatenate(sizes), (0.05, 0.5, 0.95))
         layers.append(
             Layer(
@@ -297,6 +302,16 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
             )
         )  # fmt: skip
     return layers
+
+
+def _drifting_in_common(f: ModelFit) -> ModelFit:
+    """The fit where all specimens may drift alike as well, by as much as each on its own.
+
+    For sizes alone: whether specimens drift is decided without it, for a run-in would hide in it.
+    """
+    line = along_specimens(f.setup.observations.conditions)[0]
+    alike = line[:, None, None] * ALIKE_IN_BOTH[:, None]
+    return fit(f.setup.with_effects(alike, np.ones(1), SPECIMEN_DRIFT), f.acting, start=f, iterations=15)
 
 
 def drawn_effects(f: ModelFit, rng: np.random.Generator) -> FloatArray:

@@ -153,11 +153,12 @@ class Setup:
             scatter=self.scatter[keep],
         )  # fmt: skip
 
-    def with_effects(self, columns: FloatArray, sd: FloatArray) -> Setup:
-        """The same with further random effects along ``columns`` (n, 2, d), of the standard deviations ``sd`` (d,)."""
+    def with_effects(self, columns: FloatArray, sd: FloatArray, group: int = FIXED) -> Setup:
+        """The same with further random effects along ``columns`` (n, 2, d), of the standard deviations ``sd`` (d,), in
+        units of the size of a ``group`` if one is given."""
         return replace(
             self, shared=np.concatenate([self.shared, columns], axis=2), unit=np.concatenate([self.unit, sd]),
-            group=np.concatenate([self.group, np.full(len(sd), FIXED)]),
+            group=np.concatenate([self.group, np.full(len(sd), group)]),
         )  # fmt: skip
 
     def base(self, law: FloatArray) -> Base:
