@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -39,12 +39,13 @@ def drift(b: Bench, rng: np.random.Generator) -> np.ndarray:
     return of_one_size(np.cumsum(rng.standard_t(4, size=len(b.tests))))
 
 
-def specimen_drift(b: Bench, rng: np.random.Generator) -> np.ndarray:
-    rates = {name: rng.normal() for name in sorted(set(b.tests["specimen"]))}
+def specimen_drift(b: Bench, rng: np.random.Generator, in_common: float = 0.0) -> np.ndarray:
+    rates = {name: in_common + rng.normal() for name in sorted(set(b.tests["specimen"]))}
     run = b.tests["specimen_run"] - b.tests.groupby("specimen")["specimen_run"].transform("mean")
     return of_one_size(run.to_numpy() * b.tests["specimen"].map(rates).to_numpy())
 
 
+specimen_drift_in_common = partial(specimen_drift, in_common=0.8)
 WHOLE, SMALL = Design(repeats=2), Design(samples=("F", "B"), repeats=3)
 
 
@@ -103,6 +104,15 @@ def test_what_the_sizes_may_be_widens_the_interval_of_days(monkeypatch: pytest.M
     monkeypatch.setattr(inference, "SIZE_PRIORS", [])  # no size is drawn: all stay those of the fit
     (alone,) = inference.nuisance_layers(fitted, 0.01)
     assert told.high - told.low > 1.05 * (alone.high - alone.low)
+
+
+def test_what_the_rates_of_all_specimens_have_in_common_counts_as_their_drift(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted = diagnosed(6, specimen_drift_in_common, small=True).baseline
+    (told,) = inference.nuisance_layers(fitted, 0.01)
+    monkeypatch.setattr(inference, "_drifting_in_common", lambda f: f)
+    (alone,) = inference.nuisance_layers(fitted, 0.01)
+    assert told.low < 100 * SIZE < told.high
+    assert alone.effect_percent < told.effect_percent < 100 * SIZE
 
 
 @pytest.mark.slow
