@@ -269,14 +269,15 @@ class Screen:
         return share_beyond(self.chance_library, strength)
 
 
-def share_beyond(chance: FloatArray, value: float) -> float:
-    """Share of replicates (r,) at or above a value, beyond the last one by a fitted Gumbel tail; NaN without any."""
+def share_beyond(chance: FloatArray, value: float, least_scale: float = 1e-3) -> float:
+    """Share of replicates (r,) at or above a value, beyond the last one by a fitted Gumbel tail of a scale that is not
+    below ``least_scale``; NaN without any."""
     if not len(chance):
         return float("nan")
     counted = (1 + np.sum(chance >= value)) / (1 + len(chance))
     if counted > 5.0 / len(chance):
         return float(counted)
-    scale = max(float(np.std(chance)) * np.sqrt(6) / np.pi, 1e-3)
+    scale = max(float(np.std(chance)) * np.sqrt(6) / np.pi, least_scale)
     above_mode = (value - float(np.mean(chance))) / scale + np.euler_gamma
     fitted = float(-np.expm1(-np.exp(-above_mode)))
     return min(float(counted), max(fitted, 1e-12))

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from scipy.special import chdtrc
 
+from tribo.diagnostics.candidates import LIKELY
 from tribo.diagnostics.contrasts import allowed_wrong_form, decided, share_beyond
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.inference import gain_on_groups
@@ -26,6 +27,8 @@ RESCORED, RESCORED_MEASURED = 60, 400  # best laws at the fitted noise that are 
 NEAR = -1.0  # net log likelihood of a curve or surface from which sets of samples are looked at
 SHOWN = 25  # of the best laws, in the table
 MOST_LAWS = 3
+SEARCHES = 2  # of formulas, and of curves and surfaces: a chance of either counts twice
+TAIL_OF_EVIDENCE = 1.0  # scale of the tail of an evidence ln k: its chance is at most 1 / k (Markov's inequality)
 TIMES = {"run_order", "elapsed_s", "clock_h", "date"}  # what days and drift follow as well
 BEYOND_DRIFT = 2.0  # standard errors by which a law of time has to predict sessions left out better than drift
 
@@ -93,16 +96,18 @@ def discover_laws(
         # all, so that a law which fails here needs no simulated campaigns
         p, draws = 1.0, (replicates, rng)
         if float(chdtrc(1, 2.0 * max(strongest, 0.0))) < level:
-            p = share_beyond(_best_by_chance(model, grammar, strongest, draws, progress), strongest)
+            p = SEARCHES * share_beyond(_best_by_chance(model, grammar, strongest, draws, progress), strongest)
         if p < level:
             law = choose_form(model, grammar, best, p, rng)
         elif (free := _worth_counting(model, used)) is not None:
             likely = float(free.evidence(model.residual[None]).max())
             chance = _by_chance(model, partial(_likeliest, free), likely, draws, progress)
-            p = share_beyond(chance, likely)
+            p = SEARCHES * share_beyond(chance, likely, TAIL_OF_EVIDENCE)
             if p >= level:
                 break
             law = choose_free(model, free, used, p, rng)
+            if law.model.score - model.score < LIKELY:
+                break  # of tests that lie far off, which the search counts in full, and the fit does not
         else:
             break
         if set(law.law.columns) <= TIMES and not _predicts_sessions(model, law.model):
