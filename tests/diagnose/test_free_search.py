@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from blind.tribometer import Design
 
+from tribo.diagnostics.contrasts import share_beyond
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.model import Setup
 from tribo.diagnostics.replicates import drawn_residuals
-from tribo.lawsearch import free_search
+from tribo.lawsearch import free_search, search
 from tribo.lawsearch.free_search import OUTLIER, FreeSearch, free_columns, free_scopes, likeliest
 from tribo.lawsearch.grammar import ALL, BOTH, T
-from tribo.lawsearch.model_choice import CLOSE
+from tribo.lawsearch.model_choice import CLOSE, FoundLaw
+from tribo.lawsearch.search import TAIL_OF_EVIDENCE
 from tribo.records import REGIMES
 
 from .known import baseline, made
@@ -80,3 +83,30 @@ def test_nothing_hidden_speaks_for_a_curve_or_surface_by_odds_of_20_to_1_in_few_
     search = searched(model, free_columns(model.setup.observations.conditions))
     drawn = drawn_residuals(model, np.random.default_rng(4), 60).transpose(0, 2, 1)
     assert (search.evidence(drawn).max(axis=(1, 2)) > CLOSE).mean() < 0.1
+
+
+def test_the_chance_of_an_evidence_beyond_all_that_were_counted_is_that_of_a_tail_with_odds_as_long_as_the_evidence():
+    """However narrow the counted ones are: a likelihood ratio of k has a chance of at most 1 / k."""
+    counted = np.linspace(-0.6, 0.2, 60)
+    narrow, tail = (share_beyond(counted, 6.0, scale) for scale in (1e-3, TAIL_OF_EVIDENCE))
+    assert narrow < 1e-9
+    assert tail == pytest.approx(1 - np.exp(-np.exp(-(6.0 + 0.2) - np.euler_gamma)), rel=1e-9)
+
+
+def damp_tests_lifted(s: Setup) -> np.ndarray:
+    """The four dampest tests show a quarter more friction."""
+    humidity = s.observations.conditions.humidity_pct
+    return (0.25 * (humidity >= np.sort(humidity)[-4]))[:, None] * np.ones(2)
+
+
+def test_a_curve_from_which_the_fit_gains_nothing_is_no_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search counts tests that lie far off in full, the fit does not."""
+    model = baseline(made(damp_tests_lifted, seed=3, design=Design(samples=("F", "A", "B", "Sx"), repeats=1)))
+
+    def found() -> tuple[FoundLaw, ...]:
+        return search.discover_laws(model, level=0.003, rng=np.random.default_rng(1)).laws
+
+    assert [law.law.columns for law in found()] == [("humidity_pct",)]
+    chosen = search.choose_free
+    monkeypatch.setattr(search, "choose_free", lambda *given: replace(chosen(*given), model=model))
+    assert found() == ()
