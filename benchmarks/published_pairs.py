@@ -19,6 +19,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from structured_stick_slip import hexagonal
+
 from tribo.berardo2019.published_tables import load_table2, load_table2_simulated_anew
 from tribo.design.target import read_target
 from tribo.errors import SimulationError
@@ -28,12 +30,12 @@ from tribo.springblock import SimConfig, simulate
 PRESSURES_KPA = (5.0, 20.0)
 AREA_FRACTIONS = (0.36, 0.51, 0.64, 0.75)
 PITCH_M = 40e-6
-LOWER = {  # what abstracts say to be below a flat sample, dry: shapes that touch or are left out, and the regime
+LOWER = (  # what abstracts say to be below a flat sample, dry: shapes that touch or are left out, and the regime
     ("Biomimetics 9, 542, 2024: micro-hexagons on glass, dry", "hexagonal pillars", "static"),
     ("Biomimetics 9, 542, 2024: micro-hexagons on glass, dry", "hexagonal pillars", "sliding"),
     ("J. Tribol. 144, 031704, 2022: square cavities in polyethylene", "square holes", "sliding"),
     ("Lubricants 5, 45, 2017: grooves in elastomers", "grooves", "sliding"),
-}
+)
 OUTSIDE = {
     "Varenberg and Gorb 2007, IJTC2007-44: mushroom-shaped pillars, dry": "height of mushroom-shaped pillars",
     "Bai et al. 2014, Langmuir: ridges and channels against a rough surface": "roughness of the counterface",
@@ -88,12 +90,10 @@ def inside() -> list[list[object]]:
     return found
 
 
-def pattern_of(shape: str, area_fraction: float) -> Pattern:
-    row_m = 0.5 * math.sqrt(3.0) * PITCH_M
+def shaped(shape: str, area_fraction: float) -> Pattern:
     if shape == "hexagonal pillars":
-        diameter_m = math.sqrt(area_fraction * PITCH_M * row_m * 4.0 / math.pi)
-        return Pattern(shape, "circle", (diameter_m, diameter_m), (PITCH_M, row_m), staggered=True, feature="pillar",
-                       lattice="hexagonal")  # fmt: skip
+        diameter_m = math.sqrt(area_fraction * 2.0 * math.sqrt(3.0) / math.pi) * PITCH_M
+        return hexagonal(shape, "pillar", 1e6 * diameter_m, 1e6 * PITCH_M)
     if shape == "square holes":
         side_m = math.sqrt(1.0 - area_fraction) * PITCH_M
         return Pattern(shape, "square", (side_m, side_m), (PITCH_M, PITCH_M))
@@ -106,10 +106,10 @@ def signs() -> list[list[object]]:
     base = SimConfig(blocks=(45, 45), seed=1, duration_peaks=4.0, window_start_peaks=2.0, angle_deg=0.0)
     flat = {p: simulate(base.with_(pressure_Pa=1e3 * p)) for p in PRESSURES_KPA}
     found: list[list[object]] = []
-    for source, shape, regime in sorted(LOWER):
+    for source, shape, regime in LOWER:
         ratios = []
         for share in AREA_FRACTIONS:
-            pattern = pattern_of(shape, share)
+            pattern = shaped(shape, share)
             for p in PRESSURES_KPA:
                 run = simulate(base.with_(pressure_Pa=1e3 * p, sample=shape, pattern=pattern))
                 ratios.append(getattr(run, f"{regime}_friction") / getattr(flat[p], f"{regime}_friction"))

@@ -84,12 +84,9 @@ def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[CauseCand
         judged(start.model, refitted(c.fit, c.fit.acting), c.raw - c.gain) if c.gain > hopeful else c
         for c in tried.values()
     ]
-    standing = [c for c in fitted if c.gain <= hopeful or _is_possible(start.model, c)]
+    possible = [c for c in fitted if c.gain <= hopeful or not _adhesion_turns_negative(start.model, c)]
+    standing = [c for c in possible if c.gain <= hopeful or _more_than_days_differ(start.model, c)]
     return sorted(standing, key=lambda c: -c.gain)
-
-
-def _is_possible(start: ModelFit, c: CauseCandidate) -> bool:
-    return not _adhesion_turns_negative(start, c) and _more_than_days_differ(start, c)
 
 
 def _adhesion_turns_negative(start: ModelFit, c: CauseCandidate) -> bool:

@@ -266,7 +266,9 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
     return corrections
 
 
-NUISANCES: dict[Nuisance, int] = {"days": SESSION, "drift": DRIFT, "specimen_drift": SPECIMEN_DRIFT}
+NUISANCES: dict[Nuisance, tuple[int, int]] = {
+    "days": (SESSION, SESSION + 1), "drift": (DRIFT, DRIFT + 1), "specimen_drift": (SPECIMEN_DRIFT, SPECIMEN_DRIFT + 1),
+}  # fmt: skip
 CHAINS, SETTLING, KEPT = 40, 20, 40  # of draws of the random effects; steps of a chain, before it counts and after
 
 
@@ -279,8 +281,8 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     in part, and a kind that is not beyond chance may still be there.
     """
     s, chances = f.setup, {}
-    kinds = {name: (s.group == group) | (s.group == group + 1) for name, group in NUISANCES.items()}
-    for name, here in kinds.items():
+    for name, groups in NUISANCES.items():
+        here = np.isin(s.group, groups)
         if here.any():
             held, offset = held_still(s, here)
             ratio = f.score - fit(held, f.acting, start=f, iterations=15).score - offset
@@ -289,11 +291,11 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     if not told:
         return []
     wider = _drifting_in_common(f)
-    drawn, group = drawn_effects(wider, np.random.default_rng(0)), wider.setup.group
+    drawn = drawn_effects(wider, np.random.default_rng(0))
     layers = []
     for name, p in told.items():
-        of_kind = np.isin(group, (NUISANCES[name], NUISANCES[name] + 1))
-        sizes = [_realised(wider.setup, np.where(of_kind, part, 0.0)) for part in np.array_split(drawn, KEPT)]
+        here = np.isin(wider.setup.group, NUISANCES[name])
+        sizes = [_realised(wider.setup, np.where(here, part, 0.0)) for part in np.array_split(drawn, KEPT)]
         low, middle, high = 100.0 * np.quantile(np.concatenate(sizes), (0.05, 0.5, 0.95))
         layers.append(
             Layer(

@@ -324,12 +324,9 @@ def thresholds_of(config: SimConfig, lattice: Lattice) -> Thresholds:
     """Draw the local friction: mu F_n + F_a on contact blocks, none on cavities."""
     nx, ny = config.blocks
     rng = np.random.default_rng(config.seed)
-    if config.friction_patch_m is None:
-        static, sliding = rng.standard_normal((2, nx * ny))
-    else:
-        side = round(config.friction_patch_m / config.spacing_m)
-        drawn = rng.standard_normal((2, -(-ny // side), -(-nx // side)))
-        static, sliding = drawn.repeat(side, axis=1).repeat(side, axis=2)[:, :ny, :nx].reshape(2, nx * ny)
+    side = 1 if config.friction_patch_m is None else round(config.friction_patch_m / config.spacing_m)
+    drawn = rng.standard_normal((2, -(-ny // side), -(-nx // side)))
+    static, sliding = drawn.repeat(side, axis=1).repeat(side, axis=2)[:, :ny, :nx].reshape(2, nx * ny)
     f = config.friction
     share = lattice.area_fraction if config.normal_force == "redistributed" else 1.0
     area = config.spacing_m**2
