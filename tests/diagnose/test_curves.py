@@ -168,7 +168,30 @@ def test_the_band_of_a_product_of_two_columns_holds_a_hidden_change_that_bends()
     assert [shape.kind for shape in law.law.shapes] == ["linear", "linear"]
     s = law.model.setup
     true = centred(warm_beside_humid(s), s.observations.conditions, terms_of(law.model)["load term"])
-    assert ((law.band[1] <= true) & (true <= law.band[2])).mean() > 0.65  # 0.47 without a surface beside it
+    assert ((law.band[1] <= true) & (true <= law.band[2])).mean() > 0.65  # 0.47 by the product alone
+
+
+def broken_line(s: Setup) -> np.ndarray:
+    """Sliding friction rises and falls with the temperature along straight lines."""
+    t = s.observations.conditions.temperature_C
+    course = 0.12 * np.interp(t, [20, 22, 22.7, 24.2, 26], [0.2, 0.0, 1.0, -0.4, 0.3])
+    return np.column_stack([np.zeros(len(t)), course])
+
+
+def uneven_wave(s: Setup) -> np.ndarray:
+    h = s.observations.conditions.humidity_pct
+    return np.column_stack([np.zeros(len(h)), 0.05 * np.sin(h / 3.0) * (1 + 0.8 * np.sin(h / 5.0))])
+
+
+def test_the_band_of_a_formula_holds_what_the_formula_does_not_follow() -> None:
+    held = []
+    for hidden in (broken_line, uneven_wave):
+        (law,) = discover_laws(baseline(made(hidden, seed=2, design=DESIGN)), replicates=20).laws
+        assert law.law.shapes[0].kind != "curve"
+        s = law.model.setup
+        true = centred(hidden(s), s.observations.conditions, terms_of(law.model)["load term"])[:, 1]
+        held.append(((law.band[1, :, 1] <= true) & (true <= law.band[2, :, 1])).mean())
+    assert np.mean(held) > 0.85  # 0.78 for what the formula leaves alone
 
 
 def test_a_surface_is_written_and_read_again_and_holds_where_it_is_at_work(surface: FoundLaw, tmp_path: Path) -> None:

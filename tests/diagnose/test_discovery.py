@@ -231,6 +231,9 @@ def test_the_figure_shows_the_law_over_its_column(diagnosed: Diagnosis) -> None:
     peak = shown.loc[shown["law_percent"].idxmax(), "x"]
     assert abs(peak - 23.0) < 0.4
     assert (shown["low_percent"] <= shown["high_percent"]).all()
+    assert diagnosed.laws is not None
+    width = np.diff(np.log1p(shown[["low_percent", "high_percent"]].to_numpy() / 100), axis=1)[:, 0]
+    assert width == pytest.approx(np.diff(diagnosed.laws.laws[0].band[1:, :, 1], axis=0)[0])
     assert np.corrcoef(shown["partial_percent"], shown["law_percent"])[0, 1] > 0.5
     assert len(draw_law(shown).axes) == 1
 

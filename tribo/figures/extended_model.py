@@ -15,7 +15,9 @@ from tribo.comparison import findings
 from tribo.diagnostics.effect_sizes import percent, rms_percent
 from tribo.diagnostics.model import effect_of
 from tribo.figures import style
-from tribo.lawsearch.grammar import UNITS, WrittenLaw, column_values
+from tribo.lawsearch.grammar import LOAD_TERM, UNITS, WrittenLaw, column_values
+from tribo.lawsearch.model_choice import centred
+from tribo.lawsearch.scoring import terms_of
 from tribo.records import REGIMES
 from tribo.vocabulary import in_words
 
@@ -143,9 +145,9 @@ def law_numbers(d: Diagnosis) -> pd.DataFrame:
 def law_numbers_of(found: Discovery) -> pd.DataFrame:
     """One row per law, regime and test that the law acts on and whose columns were recorded, in percent of T.
 
-    ``partial_percent`` is what the model without the law leaves of a test, ``law_percent`` the law with its 90 % band,
-    both about the mean of the law over these tests. ``x`` is the column of the law, or the product of
-    its two shapes; ``x_name`` the name in a column of names.
+    ``partial_percent`` is what the model without the law leaves of a test, ``law_percent`` the law, both about the mean
+    of the law over these tests. The 90 % band is that of what friction does there, which a formula may leave.
+    ``x`` is the column of the law, or the product of its two shapes; ``x_name`` the name in a column of names.
     """
     parts = [_of_law(number, law) for number, law in enumerate(found.laws, start=1)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=LAW_COLUMNS)
@@ -156,7 +158,7 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     c = s.observations.conditions
     left = found.model.left
     change = effect_of(s, found.model.law, found.model.acting[-1], found.model.values[-1])
-    half = 0.5 * (found.band[2] - found.band[1])
+    _, low, high = found.band - centred(change, c, terms_of(found.model)[LOAD_TERM])
     x, names = _abscissa(found)
     acts = law.weight(c) != 0
     for name in law.columns:
@@ -168,7 +170,7 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
             "law_number": number, "formula": law.formula(), "regime": REGIMES[k], "sample": c.sample[acts],
             "covariate": _label(law), "x": x[acts], "x_name": names[acts],
             "partial_percent": percent(left[acts, k] + course), "law_percent": percent(course),
-            "low_percent": percent(course - half[acts, k]), "high_percent": percent(course + half[acts, k]),
+            "low_percent": percent(course + low[acts, k]), "high_percent": percent(course + high[acts, k]),
         }  # fmt: skip
         parts.append(pd.DataFrame(part))
     return pd.concat(parts, ignore_index=True)[LAW_COLUMNS]

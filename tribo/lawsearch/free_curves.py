@@ -3,7 +3,8 @@ with its band.
 
 A curve is held at knots along the column. It is uncertain by what the campaign leaves open, averaged over how large,
 how smooth and how fast it may be (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and
-5). A formula that is only nearly right has such a curve beside it.
+5). The band of a formula is that of the curve of its column: the formula was chosen among many once the data had been
+seen, the curve was not.
 """
 
 from __future__ import annotations
@@ -34,7 +35,6 @@ KNOTS = 25
 ALONG = 13  # knots of a surface along each column
 LENGTHS = (0.07, 0.15, 0.3, 0.6)  # over which a curve changes, in shares of the range of the column
 SIZES = np.geomspace(0.005, 0.5, 9)  # standard deviation of a curve, in ln T
-FREE = 3.0  # standard deviation of the amplitude of a formula
 FLAT_BELOW = 1e-7  # of the largest variance of a curve along its principal directions, below which one is left out
 FOLDS = 5  # of whole specimens that are left out
 AS_GOOD = 1.0  # standard errors by which tests left out may favour a curve over the formula that stays
@@ -86,22 +86,18 @@ def kernels(shape: Shape) -> list[FloatArray]:
 class FreeCurve:
     """A curve in one scope of laws, known from a campaign.
 
-    ``columns`` (n, 2, k) of ln T are those of a formula, if there is one beside it, and of the curve at each knot;
-    ``value`` (k,) and ``covariance`` (k, k) are what the campaign tells of their coefficients, ``prior`` (knots, r)
-    spans the curves that are likely, and ``evidence`` is the log of the marginal likelihood over none.
+    ``columns`` (n, 2, knots) of ln T are those of the curve at each knot; ``heights`` (knots,) are what the campaign
+    tells of ln T there, where the law acts fully, about a mean of zero over its tests, with their ``covariance``.
+    ``prior`` (knots, r) spans the curves that are likely, and ``evidence`` is the log of the marginal likelihood over
+    none.
     """
 
     law: WrittenLaw
     columns: FloatArray
-    value: FloatArray
+    heights: FloatArray
     covariance: FloatArray
     prior: FloatArray
     evidence: float
-
-    @property
-    def heights(self) -> FloatArray:
-        """ln T at the knots where the law acts fully, about a mean of zero over its tests, without the formula."""
-        return self.value[-len(self.prior) :]
 
 
 def at_knots(shapes: Sequence[Shape], c: Conditions) -> FloatArray:
@@ -121,9 +117,7 @@ def likely(shapes: Sequence[Shape]) -> list[FloatArray]:
     return [np.asarray(np.kron(1.0 + one, 1.0 + other) - 1.0, float) for one, other in alike]
 
 
-def fitted_curve(
-    without: ModelFit, scope: tuple[WrittenLaw, FloatArray], informed: float, formula: Sequence[Shape] = ()
-) -> FreeCurve:
+def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], informed: float) -> FreeCurve:
     """The curve or surface that a campaign tells of, ``without`` being its fit without the law.
 
     Parameters
@@ -135,16 +129,12 @@ def fitted_curve(
         every test.
     informed : float
         Of the information in the weighted normal equations, what a pull really tells.
-    formula : sequence of Shape, optional
-        The course, a product of these, that the curve or surface is added to.
     """
     law, effects = scope
     c = without.setup.observations.conditions
     courses = at_knots(law.shapes, c)
     acts = np.abs(law.weight(c))
     courses = courses - acts @ courses / acts.sum()
-    if formula:
-        courses = np.column_stack([np.prod([shape.of(c) for shape in formula], axis=0), courses])
     columns = courses[:, None, :] * effects[:, :, None]
     rows, residual = without.cleared(columns)
     information, pull = rows.T @ rows, rows.T @ residual
@@ -158,31 +148,27 @@ def fitted_curve(
     evidence = np.array([member[0] for member in found])
     share = np.exp(evidence - evidence.max())
     share = share / share.sum()
-    value = np.sum([w * member[1] for w, member in zip(share, found, strict=True)], axis=0)
-    spread = sum(
-        w * (member[2] + np.outer(member[1] - value, member[1] - value)) for w, member in zip(share, found, strict=True)
+    heights = np.sum([w * member[1] for w, member in zip(share, found, strict=True)], axis=0)
+    covariance = sum(
+        w * (own + np.outer(value - heights, value - heights))
+        for w, (_, value, own, _) in zip(share, found, strict=True)
     )
     prior = sum(w * member[3] @ member[3].T for w, member in zip(share, found, strict=True))
     variance, directions = np.linalg.eigh(prior)
     kept = variance > FLAT_BELOW * variance[-1]
     prior = directions[:, kept] * np.sqrt(variance[kept])
     mean = float(evidence.max() + np.log(np.mean(np.exp(evidence - evidence.max()))))
-    return FreeCurve(law, columns, value, np.asarray(spread), prior, mean)
+    return FreeCurve(law, columns, heights, np.asarray(covariance), prior, mean)
 
 
 def _member(
     information: FloatArray, pull: FloatArray, root: FloatArray, informed: float
 ) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-    """Log marginal likelihood, coefficients and their covariance for curves spanned by ``root`` (knots, r); and the
-    root."""
-    k = len(information) - len(root)
-    basis = np.zeros((len(information), k + root.shape[1]))
-    basis[:k, :k] = FREE * np.eye(k)
-    basis[k:, k:] = root
-    own, towards = basis.T @ information @ basis, basis.T @ pull
+    """Log marginal likelihood, heights and their covariance for curves spanned by ``root`` (knots, r); and the root."""
+    own, towards = root.T @ information @ root, root.T @ pull
     within = np.eye(len(own)) + own
     evidence = 0.5 * float(towards @ np.linalg.solve(within, towards)) - 0.5 * float(np.linalg.slogdet(within)[1])
-    posterior = basis @ np.linalg.inv(np.eye(len(own)) + informed * own) @ basis.T
+    posterior = root @ np.linalg.inv(np.eye(len(own)) + informed * own) @ root.T
     return evidence, posterior @ (informed * pull), posterior, root
 
 

@@ -128,11 +128,10 @@ class Background:
     def conditions(self) -> Conditions:
         return self.setup.observations.conditions
 
-    def curve(self, scope: WrittenLaw, shapes: tuple[Shape, ...], formula: tuple[Shape, ...] = ()) -> FreeCurve:
-        """The curve or surface in one scope, alone or beside a formula."""
+    def curve(self, scope: WrittenLaw, shapes: tuple[Shape, ...]) -> FreeCurve:
+        """The curve or surface in one scope."""
         without = replace(self.without, residual=self.residual)
-        law = replace(scope, shapes=shapes)
-        return fitted_curve(without, (law, self.effects(scope)[0]), self.informed, formula)
+        return fitted_curve(without, (replace(scope, shapes=shapes), self.effects(scope)[0]), self.informed)
 
     def effects(self, *scopes: WrittenLaw) -> FloatArray:
         return effects_of(scopes, self.conditions, self.terms)
@@ -334,11 +333,11 @@ def _told_at(shapes: Sequence[Shape], c: Conditions) -> dict[int, str]:
 
 
 def _beyond_patterns(at: Background, curve: FreeCurve) -> tuple[FloatArray, FloatArray]:
-    """The change of ln T of every test by a curve and the formula beside it, beyond what flat law and patterns can
-    absorb, and its variance, (n, 2) each."""
-    each = [centred(curve.columns[:, :, k], at.conditions, at.terms[LOAD_TERM]) for k in range(len(curve.value))]
+    """The change of ln T of every test by a curve, beyond what flat law and patterns can absorb, and its variance,
+    (n, 2) each."""
+    each = [centred(curve.columns[:, :, k], at.conditions, at.terms[LOAD_TERM]) for k in range(len(curve.heights))]
     beyond = np.stack(each, axis=2)
-    return beyond @ curve.value, np.maximum(np.einsum("nri,ij,nrj->nr", beyond, curve.covariance, beyond), 0.0)
+    return beyond @ curve.heights, np.maximum(np.einsum("nri,ij,nrj->nr", beyond, curve.covariance, beyond), 0.0)
 
 
 def levels_of_law(law: WrittenLaw, c: Conditions) -> Shape | None:
@@ -586,8 +585,9 @@ def _percent(at: Background, form: Form, parameters: dict[str, Estimate], wider:
 def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
     """The mean change by all laws in proportion to their likelihood, with its spread, (3, n, 2).
 
-    No law is exactly of the grammar. A formula of one column has a curve beside it, one of two a surface, as large as
-    the campaign leaves open; any other may be wrong by the same share of its own effect as a mechanism.
+    No law is exactly of the grammar, and a formula was chosen among many once the data had been seen. What is told of
+    its change is therefore the curve of its column, or the surface of both; where there is none, it may be wrong by the
+    same share of its own effect as a mechanism.
     """
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
@@ -607,9 +607,9 @@ def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
 def _change_by_form(at: Background, form: Form, wider: float) -> tuple[FloatArray, FloatArray]:
     """The change of ln T of every test by the laws of a form, and its variance, (n, 2) each."""
     shapes, knots = form.best.shapes, curve_of if len(form.best.shapes) == 1 else knots_of
-    beside = tuple(own for shape in shapes if (own := knots(shape.column, at.conditions)) is not None)
-    if len(beside) == len(shapes):
-        mean, spread = _beyond_patterns(at, at.curve(form.scope, beside, shapes))
+    free = tuple(own for shape in shapes if (own := knots(shape.column, at.conditions)) is not None)
+    if len(free) == len(shapes):
+        mean, spread = _beyond_patterns(at, at.curve(form.scope, free))
         return mean, wider**2 * spread
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
