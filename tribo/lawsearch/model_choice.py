@@ -181,12 +181,12 @@ def choose_form(model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, 
     """
     background, forms = _best_forms(model, grammar, first)
     if (surface := _likelier_surface(model, background, forms[0].best, grammar.without)) is not None:
-        return _by_curve(model, surface, p, rng)
+        return _by_curve(model, surface, grammar.without, p, rng)
     if levels := levels_of_law(forms[0].best, background.conditions):
         return _by_levels(model, replace(forms[0].scope, shapes=(levels,)), p, rng)
     curve = _likeliest_curve(background, forms, grammar)
     if curve is not None and better_left_out(model, background.after, curve):
-        return _by_curve(model, curve, p, rng)
+        return _by_curve(model, curve, grammar.without, p, rng)
     after, form = background.after, forms[0]
     parameters = estimates(after, len(after.acting) - 1) | _place_and_width(form)
     wider = 1.0
@@ -198,7 +198,7 @@ def choose_form(model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, 
     return FoundLaw(
         form.best, parameters, _percent(background, form, parameters, wider), p, gain(model, after, rng),
         tuple(f.best for f in forms[1:] if f.evidence > form.evidence - CLOSE), after,
-        _band(background, forms, wider),
+        _band(background, forms, grammar.without, wider),
     )  # fmt: skip
 
 
@@ -212,7 +212,7 @@ def choose_free(
     if apart > alone:
         surface = _settled_surface(model, _surface(scope, columns, model), without)
         if surface is not None:
-            return _by_curve(model, surface, p, rng)
+            return _by_curve(model, surface, without, p, rng)
     grammar = Grammar(model, without, [each for each in shapes_of(c) if {s.column for s in each[0]} == {column}])
     net = grammar.net(Projection(model, model.residual[None]))[0]
     return choose_form(model, grammar, grammar.law(int(np.argmax(net))), p, rng)
@@ -287,7 +287,9 @@ def _likeliest_curve(at: Background, forms: Sequence[Form], grammar: Grammar) ->
     return max(tried.values(), key=lambda curve: curve.evidence - cost[replace(curve.law, shapes=())], default=None)
 
 
-def _by_curve(model: ModelFit, curve: FreeCurve, p: float, rng: np.random.Generator) -> FoundLaw:
+def _by_curve(
+    model: ModelFit, curve: FreeCurve, without: Collection[str], p: float, rng: np.random.Generator
+) -> FoundLaw:
     """A law that no formula tells as well: its course with a band, and what friction does along it."""
     at, heights = Background(model, _with_heights(curve)), curve.heights
     after = at.after
@@ -304,7 +306,7 @@ def _by_curve(model: ModelFit, curve: FreeCurve, p: float, rng: np.random.Genera
     about = np.eye(len(heights))[list(told)] - there.mean(axis=0)
     each = _percents(about @ heights * full, about @ covariance @ about.T)
     levels = dict(zip(told.values(), each, strict=True))
-    mean, spread = _beyond_patterns(at, curve)
+    mean, spread = _change_of_any_form(at, curve, without)
     half = NORMAL_90 * wider * np.sqrt(spread)
     return FoundLaw(
         at.law, parameters, (effect.value, effect.low, effect.high), p, gain(model, after, rng), (), after,
@@ -332,12 +334,28 @@ def _told_at(shapes: Sequence[Shape], c: Conditions) -> dict[int, str]:
     return {i * across + j: f"{one} and {other}" for i, one in named[0].items() for j, other in named[1].items()}
 
 
-def _beyond_patterns(at: Background, curve: FreeCurve) -> tuple[FloatArray, FloatArray]:
+def _change_of_any_form(at: Background, curve: FreeCurve, without: Collection[str]) -> tuple[FloatArray, FloatArray]:
     """The change of ln T of every test by a curve, beyond what flat law and patterns can absorb, and its variance,
-    (n, 2) each."""
-    each = [centred(curve.columns[:, :, k], at.conditions, at.terms[LOAD_TERM]) for k in range(len(curve.heights))]
-    beyond = np.stack(each, axis=2)
-    return beyond @ curve.heights, np.maximum(np.einsum("nri,ij,nrj->nr", beyond, curve.covariance, beyond), 0.0)
+    (n, 2) each; averaged with the surfaces of its column and another one, in proportion to their likelihood."""
+    curves, evidence = [curve], [curve.evidence]
+    column, scope = curve.law.columns[0], replace(curve.law, shapes=())
+    pairs = [each for each in free_columns(at.conditions, without) if len(each) > 1 and column in each]
+    if len(curve.law.shapes) == 1 and pairs:
+        left = replace(at.without, residual=at.residual)
+        search = FreeSearch(left, [scope], np.zeros(1), [(column,), *pairs])
+        alone, *beside = search.evidence(at.residual[None])[0, :, 0]
+        surfaces = [_surface(scope, each, left) for each, e in zip(pairs, beside, strict=True) if e > alone - IN_REACH]
+        curves += surfaces
+        evidence += [each.evidence - np.log(len(pairs)) for each in surfaces]
+    share = np.exp(np.array(evidence) - max(evidence))
+    changes = []
+    for each in curves:
+        columns = [centred(one, at.conditions, at.terms[LOAD_TERM]) for one in np.moveaxis(each.columns, 2, 0)]
+        beyond = np.stack(columns, axis=2)
+        changes.append((beyond @ each.heights, np.einsum("nri,ij,nrj->nr", beyond, each.covariance, beyond)))
+    mean = np.average([value for value, _ in changes], axis=0, weights=share)
+    spread = np.average([own + (value - mean) ** 2 for value, own in changes], axis=0, weights=share)
+    return mean, np.maximum(spread, 0.0)
 
 
 def levels_of_law(law: WrittenLaw, c: Conditions) -> Shape | None:
@@ -582,7 +600,7 @@ def _percent(at: Background, form: Form, parameters: dict[str, Estimate], wider:
     return value, low, high
 
 
-def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
+def _band(at: Background, forms: list[Form], without: Collection[str], wider: float) -> FloatArray:
     """The mean change by all laws in proportion to their likelihood, with its spread, (3, n, 2).
 
     No law is exactly of the grammar, and a formula was chosen among many once the data had been seen. What is told of
@@ -595,7 +613,7 @@ def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
         if form.evidence < forms[0].evidence + np.log(WEIGHTLESS):
             continue
         share = float(np.exp(form.evidence - forms[0].evidence))
-        whole, spread = _change_by_form(at, form, wider)
+        whole, spread = _change_by_form(at, form, without, wider)
         mean += share * whole
         square += share * (whole**2 + spread)
         total += share
@@ -604,12 +622,14 @@ def _band(at: Background, forms: list[Form], wider: float) -> FloatArray:
     return np.stack([mean, mean - half, mean + half])
 
 
-def _change_by_form(at: Background, form: Form, wider: float) -> tuple[FloatArray, FloatArray]:
+def _change_by_form(
+    at: Background, form: Form, without: Collection[str], wider: float
+) -> tuple[FloatArray, FloatArray]:
     """The change of ln T of every test by the laws of a form, and its variance, (n, 2) each."""
     shapes, knots = form.best.shapes, curve_of if len(form.best.shapes) == 1 else knots_of
     free = tuple(own for shape in shapes if (own := knots(shape.column, at.conditions)) is not None)
     if len(free) == len(shapes):
-        mean, spread = _beyond_patterns(at, at.curve(form.scope, free))
+        mean, spread = _change_of_any_form(at, at.curve(form.scope, free), without)
         return mean, wider**2 * spread
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
