@@ -74,6 +74,7 @@ def test_designs_meet_the_target_can_be_made_and_come_with_their_campaign(tmp_pa
     assert abs(first["value"] / 5.0 - 1) <= 0.08
     assert first["low"] < first["value"] < first["high"]
     assert set(first["parts"]) == {"runs", "mesh", "model", "making"}
+    assert len({a["predictions"][0]["parts"]["runs"] for a in answers}) == 1  # the scatter of runs, of all fine designs
     folder = tmp_path / "out" / "design-1"
     assert {p.name for p in folder.iterdir()} >= {"mask.svg", "mask.png", "campaign"}
     rows = list(csv.DictReader((folder / "campaign" / "tests.csv").read_text().splitlines()))

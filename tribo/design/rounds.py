@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -377,6 +377,9 @@ def search(
     shift = {r: float(np.mean([f.logs[r] - c.logs[r] for f, c in zip(fine_first, best, strict=True)])) for r in wanted}
     again = promising(aim, fine_first, surrogates, shift, FINAL - len(fine_first), seed + 50)
     fine_all = fine_first + (made("fine-2", again, fine, FINE_RUNS, seed + FINE_SEED, 12) if again else [])
+    # a few runs of one design tell little of their scatter, which is much alike for all
+    scatter = {r: math.sqrt(np.mean([t.errors[r] ** 2 for t in fine_all])) for r in wanted}
+    fine_all = [replace(t, errors=scatter) for t in fine_all]
     fine_all.sort(key=aim.cost_of)
     distinct: list[Tried] = []
     for t in fine_all:
