@@ -454,7 +454,8 @@ def answered(rank: int, t: Tried, surrogates: Surrogates, aim: Aim, mesh: dict[R
     for want in target.target:
         value = float(reached(want, target, logs))
         parts = {
-            "runs": math.sqrt(2 * sum(t.errors[r] ** 2 for r in involved(want, target))),  # and of as many that check it
+            # of the prediction, and of as many that check it
+            "runs": math.sqrt(2 * sum(t.errors[r] ** 2 for r in involved(want, target))),
             "mesh": abs(float(reached(want, target, mesh))),
             "model": float(model_sd(want, target, sds)[0]),
             "making": space.family.tolerance_um * math.sqrt(sum(s**2 for s in slopes[want.text()].values())),
