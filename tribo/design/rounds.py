@@ -240,6 +240,22 @@ class Aim:
         return float(self.costs(t.space, [t.lengths_um], {r: np.array([v]) for r, v in t.logs.items()})[0])
 
 
+SMALLEST_PATCH = 0.7  # of the blocks of a mesh along each side
+
+
+def in_whole_periods(pattern: Pattern, base: SimConfig) -> tuple[int, int]:
+    """Blocks of a mesh, or fewer, such that the patch holds whole periods of a pattern as nearly as its spacing allows:
+    its area fraction is then that of the sample. All where one period is longer than the patch."""
+    if pattern.pitch_m is None:
+        return base.blocks
+    found = []
+    for most, pitch in zip(base.blocks, pattern.pitch_m, strict=True):
+        n = np.arange(most, math.ceil(SMALLEST_PATCH * most) - 1, -1)
+        periods = n * base.spacing_m / pitch
+        found.append(int(n[np.argmin(np.abs(periods - np.maximum(np.round(periods), 1.0)) / periods)]))
+    return found[0], found[1]
+
+
 def designed(
     patterns: Sequence[Pattern], wanted: Sequence[Response], base: SimConfig, runs: int, seed: int
 ) -> list[SimConfig]:
@@ -247,13 +263,14 @@ def designed(
     points = list(dict.fromkeys((p, d) for _, p, d in wanted))
     found = []
     for pattern in patterns:
+        blocks = in_whole_periods(pattern, base)
         for pressure, direction in points:
             low, high = (0.0, 90.0) if direction == "all" else (-SPREAD_DEG, SPREAD_DEG)
             middle = 90.0 if direction == "y" else 0.0
             for k in range(runs):
                 angle = middle + low + (high - low) * (k + 0.5) / runs
                 found.append(base.with_(
-                    sample="P", pattern=pattern, pressure_Pa=pressure, angle_deg=angle,
+                    sample="P", pattern=pattern, blocks=blocks, pressure_Pa=pressure, angle_deg=angle,
                     seed=run_seed(seed, direction, pressure, k),
                 ))  # fmt: skip
     return found
