@@ -18,11 +18,12 @@ from tribo.campaign.geometry import Making, faults_of_making
 from tribo.cli import main
 from tribo.design import answer_files, rounds
 from tribo.design.answer_files import polygons_um, repeat_um
-from tribo.design.rounds import fitted
+from tribo.design.rounds import fitted, in_whole_periods, on_mesh
 from tribo.design.target import Family, Space, read_target
 from tribo.errors import SimulationError
 from tribo.records import Pattern
 from tribo.springblock import SimConfig
+from tribo.springblock.lattice import touching_share
 from tribo.units import CAMPAIGN_COLUMNS
 
 TARGET = """
@@ -86,6 +87,23 @@ def test_designs_meet_the_target_can_be_made_and_come_with_their_campaign(tmp_pa
     pattern = PatternTable.model_validate(described).pattern("P")
     assert pattern.area_fraction == pytest.approx(answers[0]["area_fraction"])
     assert not list(faults_of_making(pattern, Making(4e-6, 3e-6, 0.5e-6)))
+
+
+@pytest.mark.parametrize("cavity", ["square", "circle", "ridge"])
+def test_the_patch_that_is_simulated_has_the_area_fraction_of_the_sample(cavity: str):
+    """As nearly as whole blocks allow; a patch of all blocks is off by up to 17 %."""
+    lengths = {"diameter_um": [6, 24]} if cavity == "circle" else {"size_x_um": [6, 24]}
+    space = Space(Family(cavity=cavity, pitch_um=[14, 40], smallest_wall_um=3, **lengths), 0)
+    base = on_mesh(SimConfig(cavity_shape="exact"), "halved")
+    for candidate in space.candidates(64, 1):
+        pattern = space.pattern(candidate)
+        share = touching_share(pattern, in_whole_periods(pattern, base), base.spacing_m)
+        assert share.mean() == pytest.approx(pattern.area_fraction, rel=0.03)
+
+
+def test_without_a_pattern_the_patch_is_all_blocks():
+    base = SimConfig()
+    assert in_whole_periods(Pattern("F"), base) == base.blocks
 
 
 def test_every_candidate_can_be_simulated():
