@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from blind.tribometer import Design
 
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import (
@@ -13,15 +14,19 @@ from tribo.diagnostics.inference import (
     _averaged,
     _log_freedom,
     _score_at,
+    estimates,
     intervals,
     pattern_factor,
     recovered,
     standard_errors,
     understated,
+    with_open_form,
     with_pattern_error,
 )
-from tribo.diagnostics.model import FIXED, OF_PATTERNS, candidates
+from tribo.diagnostics.model import FIXED, OF_PATTERNS, Acting, Setup, candidates
+from tribo.mechanisms import MECHANISMS
 
+from . import known
 from .test_screen import baseline
 
 
@@ -161,3 +166,43 @@ def test_an_interval_is_as_much_wider_as_the_errors_are_understated() -> None:
     stated = 2 * 1.645 * standard_errors(f, 0)[0]
     assert high - low > 0.97 * stated * understated(f, 0)[0]
     assert low < value < high
+
+
+OF_HOLDS = Design(samples=("F", "A", "B", "Sx"), repeats=1, holds_s=(1.0, 5.0, 25.0, 120.0, 600.0))
+AGEING = 0.07  # per unit of ln(1 + hold / 1 s)
+
+
+def aged(seed: int, off: float) -> ModelFit:
+    """Contact ageing whose change of ln T is off by a share of itself, in proportion to the logarithm of the hold about
+    a mean of zero, so that the amplitude that fits the change best stays."""
+
+    def change(s: Setup) -> np.ndarray:
+        right, x = known.acting("contact_ageing", AGEING)(s), np.log(s.observations.conditions.hold_s)
+        weight = np.sum(right**2, axis=1)
+        x = x - np.average(x, weights=weight)
+        return right * (1 + off * x / np.sqrt(np.average(x**2, weights=weight)))[:, None]
+
+    b = known.baseline(known.made(change, seed, OF_HOLDS, (0.03, 0.03)))
+    return fit(b.setup, (Acting(MECHANISMS["contact_ageing"]),), start=b)
+
+
+def test_the_interval_of_a_formula_that_is_nearly_right_holds_the_size() -> None:
+    """Off by 12 %, up or down, four campaigns each: of the intervals for a right formula none holds it."""
+    as_right, open_form = [], []
+    for seed in range(4):
+        for off in (-0.12, 0.12):
+            f = aged(seed, off)
+            for held, found in ((as_right, estimates(f, 0)), (open_form, with_open_form(f, 0))):
+                (e,) = found.values()
+                held.append(e.low <= AGEING <= e.high)
+    assert not any(as_right)
+    assert sum(open_form) >= 6
+
+
+def test_where_the_formula_is_right_the_campaign_says_so() -> None:
+    """Five holds tell the course: the interval is wider by less than two thirds, and it holds the size."""
+    for seed in range(4):
+        f = aged(seed, 0.0)
+        ((as_right,), (open_form,)) = (found.values() for found in (estimates(f, 0), with_open_form(f, 0)))
+        assert open_form.high - open_form.low < 5 / 3 * (as_right.high - as_right.low)
+        assert open_form.low <= AGEING <= open_form.high

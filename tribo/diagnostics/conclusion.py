@@ -15,12 +15,12 @@ from tribo.diagnostics.direct_evidence import OF_ZERO, Evidence, stated_evidence
 from tribo.diagnostics.effect_sizes import RECORDED, misfit_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
 from tribo.diagnostics.inference import (
-    estimates,
     gain,
     gain_of_zero,
     nuisance_layers,
     pattern_corrections,
     pattern_excess,
+    with_open_form,
 )
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.observations import observe, too_little
@@ -342,7 +342,7 @@ def _shown(named: Named) -> list[Weighed]:
     each: list[Weighed] = []
     for k, alike in enumerate(named.causes):
         shown = [*alike, *(named.rivals if k == len(named.causes) - 1 else ())]
-        sizes = [estimates(c.fit, len(c.fit.acting) - 1) for c in shown]
+        sizes = [with_open_form(c.fit, len(c.fit.acting) - 1) for c in shown]
         each += zip(shown, map(float, weights_of(shown)), sizes, strict=True)
     return each
 

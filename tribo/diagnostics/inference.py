@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import chi2, norm
 
-from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
+from tribo.diagnostics.effect_sizes import NORMAL_90, RECORDED, rms_percent
 from tribo.diagnostics.fit import ModelFit, fit, fit_without, precision_of
 from tribo.diagnostics.model import (
     ALIKE_IN_BOTH,
@@ -29,6 +29,7 @@ from tribo.diagnostics.model import (
     Acting,
     Setup,
     Target,
+    effect_of,
 )
 from tribo.diagnostics.normal_equations import Normal, block_cholesky, model_columns
 from tribo.diagnostics.observations import Observations, along_specimens
@@ -44,6 +45,8 @@ SMALLEST_SHARE = 1e-6  # of the way to a bound
 RESAMPLES = 400
 MOST_FOLDS = 30  # of whole specimens: where there are more of them, several are left out at a time
 UNKNOWN = 25.0  # variance of ln T: its factor is uncertain by e to the 5
+FORM_SHARES = (0.03, 0.06, 0.12)  # of its own effect, by which a formula may be off, to average over
+DEGREES = 3  # of the polynomials along what it follows
 PATTERN_STEPS = np.linspace(-0.8, 1.2, 6)  # of the logarithm of the pattern error about its estimate, to average over
 
 
@@ -68,6 +71,45 @@ def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
     """The values and intervals of :func:`recovered`, by the name of the parameter."""
     parameters = f.acting[index].mechanism.parameters
     return {p.name: Estimate(*found, p.unit) for p, found in zip(parameters, recovered(f, index), strict=True)}
+
+
+def with_open_form(f: ModelFit, index: int) -> dict[str, Estimate]:
+    """The values and intervals of the parameters of a mechanism whose formula may be nearly right only.
+
+    Its change of ln T may differ by a smooth course along what it follows. How large that is, the campaign tells: the
+    average over FORM_SHARES, each weighed by how likely it makes the campaign.
+    """
+    fits = [f] + [_with_form(f, index, share) for share in FORM_SHARES]
+    log_weight = np.array([g.score + _log_freedom(g) for g in fits])
+    weight = np.exp(log_weight - log_weight.max())
+    weight = weight / weight.sum()
+    values = np.array([g.values[index] for g in fits])
+    variances = np.array([standard_errors(g, index) for g in fits]) ** 2
+    middle = weight @ values
+    further = np.maximum(weight @ (variances + (values - middle) ** 2) - variances[0], 0.0)
+    found = {}
+    each = zip(f.acting[index].mechanism.parameters, recovered(f, index), strict=True)
+    for k, (p, (value, low, high)) in enumerate(each):
+        below, above = (float(np.hypot(x, NORMAL_90 * np.sqrt(further[k]))) for x in (value - low, high - value))
+        value = float(np.clip(value + middle[k] - values[0, k], p.low, p.high))
+        found[p.name] = Estimate(value, max(value - below, p.low), min(value + above, p.high), p.unit)
+    return found
+
+
+def _with_form(f: ModelFit, index: int, share: float) -> ModelFit:
+    """The fit where the change of ln T by a mechanism may differ by a ``share`` of itself, in a smooth course."""
+    s, acting = f.setup, f.acting[index]
+    c, needs = s.observations.conditions, acting.mechanism.needs
+    x = c.recorded(needs[0]) if len(needs) == 1 and needs[0] in RECORDED else c.normal_load_N
+    x = np.where(np.isfinite(x), x, np.nanmean(x))
+    x = np.log(x) if x.min() > 0.0 else x
+    if np.ptp(x) == 0.0:
+        return f
+    courses = np.polynomial.legendre.legvander(2.0 * (x - x.min()) / np.ptp(x) - 1.0, DEGREES)[:, 1:]
+    courses = courses * np.sqrt((2.0 * np.arange(1, DEGREES + 1) + 1.0) / DEGREES)
+    change = effect_of(s, f.law, acting, f.values[index])
+    wider = s.with_effects(change[:, :, None] * courses[:, None, :], np.full(DEGREES, share))
+    return fit(wider, f.acting, start=f, iterations=15)
 
 
 def understated(f: ModelFit, index: int) -> FloatArray:
