@@ -230,7 +230,7 @@ def test_intervals_of_a_combined_fit_take_the_degrees_of_freedom_of_both_parts(s
 
 
 def test_the_card_says_that_the_interval_of_a_cause_holds_if_its_formula_is_right(study: Study) -> None:
-    said = "The 90 % interval of the size holds if the formula is right (suction under the cavities)."
+    said = "The 90 % interval of the size holds if the formula is right or nearly right (suction under the cavities)."
     cause = LAYER | {"formula": MECHANISMS["suction"].formula}
     assert said in card_of(study, verdict_of(FOUND | {"layers": [cause]})).to_know
     without_formula = [cause | {"kind": "remainder"}, cause | {"formula": ""}, cause | {"low": float("nan")}]

@@ -45,7 +45,7 @@ SMALLEST_SHARE = 1e-6  # of the way to a bound
 RESAMPLES = 400
 MOST_FOLDS = 30  # of whole specimens: where there are more of them, several are left out at a time
 UNKNOWN = 25.0  # variance of ln T: its factor is uncertain by e to the 5
-FORM_SHARES = (0.03, 0.06, 0.12)  # of its own effect, by which a formula may be off, to average over
+FORM_SHARES = (0.03, 0.06, 0.12)  # of its own effect, by which a formula may be off along a column, to average over
 DEGREES = 3  # of the polynomials along what it follows
 PATTERN_STEPS = np.linspace(-0.8, 1.2, 6)  # of the logarithm of the pattern error about its estimate, to average over
 

@@ -141,7 +141,7 @@ def to_know(study: Study, verdict: Verdict | None) -> Iterator[str]:
         sized = [n.name for n in verdict.layers if n.kind == "cause" and n.formula and np.isfinite(n.low)]
         if sized:
             causes = joined([name_in_words(n) for n in dict.fromkeys(sized)])
-            yield f"The 90 % interval of the size holds if the formula is right ({causes})."
+            yield f"The 90 % interval of the size holds if the formula is right or nearly right ({causes})."
         if untested := dict.fromkeys(e.mechanism for e in verdict.not_testable):
             yield f"This design cannot test {joined([name_in_words(n) for n in untested])}."
     moved = sum(1 for t in study.ingested.by_hand if t in study.ingested.pulls)
