@@ -15,6 +15,7 @@ from scipy.linalg import block_diag
 
 from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named, refitted
 from tribo.diagnostics.fit import ModelFit, scored, solved, state_at
+from tribo.diagnostics.inference import with_open_form
 from tribo.diagnostics.model import Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.observations import BREAK_S, NO_FLAT, Observations, conditions_of
@@ -365,7 +366,9 @@ def confirming_test(cause: CauseCandidate) -> NextTest | None:
     values = np.resize(further, PULLS)
     beyond = _predicted(f, rows, **{column: values})
     ended = _predicted(f, rows, **{column: np.clip(values, recorded[0], recorded[-1])})
-    low, high = (_predicted(f, rows, **{column: np.full(PULLS, end)}) for end in (further[0], further[-1]))
+    told = np.array([e.value for e in with_open_form(f, len(f.acting) - 1).values()])
+    as_told = replace(f, values=(*f.values[:-1], told))
+    low, high = (_predicted(as_told, rows, **{column: np.full(PULLS, end)}) for end in (further[0], further[-1]))
     regime = int(np.argmax(change.mean(axis=0)))
     percent = 100.0 * float(np.expm1((high - low)[:, regime].mean()))
     design = {
