@@ -609,11 +609,18 @@ def _band(at: Background, forms: list[Form], without: Collection[str], wider: fl
     """
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
+    by_curve: dict[tuple[WrittenLaw, tuple[Shape, ...]], tuple[FloatArray, FloatArray]] = {}  # of all forms alike
     for form in forms[:MOST_IN_BAND]:
         if form.evidence < forms[0].evidence + np.log(WEIGHTLESS):
             continue
         share = float(np.exp(form.evidence - forms[0].evidence))
-        whole, spread = _change_by_form(at, form, without, wider)
+        if free := _free_shapes(form.best.shapes, at.conditions):
+            if (form.scope, free) not in by_curve:
+                by_curve[form.scope, free] = _change_of_any_form(at, at.curve(form.scope, free), without)
+            whole, spread = by_curve[form.scope, free]
+            spread = wider**2 * spread
+        else:
+            whole, spread = _change_by_form(at, form, wider)
         mean += share * whole
         square += share * (whole**2 + spread)
         total += share
@@ -622,15 +629,15 @@ def _band(at: Background, forms: list[Form], without: Collection[str], wider: fl
     return np.stack([mean, mean - half, mean + half])
 
 
-def _change_by_form(
-    at: Background, form: Form, without: Collection[str], wider: float
-) -> tuple[FloatArray, FloatArray]:
+def _free_shapes(shapes: Sequence[Shape], c: Conditions) -> tuple[Shape, ...]:
+    """The curve or surface of the columns of a formula; empty where one of them has none."""
+    knots = curve_of if len(shapes) == 1 else knots_of
+    free = tuple(own for shape in shapes if (own := knots(shape.column, c)) is not None)
+    return free if len(free) == len(shapes) else ()
+
+
+def _change_by_form(at: Background, form: Form, wider: float) -> tuple[FloatArray, FloatArray]:
     """The change of ln T of every test by the laws of a form, and its variance, (n, 2) each."""
-    shapes, knots = form.best.shapes, curve_of if len(form.best.shapes) == 1 else knots_of
-    free = tuple(own for shape in shapes if (own := knots(shape.column, at.conditions)) is not None)
-    if len(free) == len(shapes):
-        mean, spread = _change_of_any_form(at, at.curve(form.scope, free), without)
-        return mean, wider**2 * spread
     n = len(at.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
     effects, amplitudes = at.effects(form.scope)[0], _amplitudes(at, form)
