@@ -14,7 +14,7 @@ from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.model import Setup
 from tribo.diagnostics.replicates import drawn_residuals
 from tribo.lawsearch import free_search, search
-from tribo.lawsearch.free_search import OUTLIER, FreeSearch, free_columns, free_scopes, likeliest
+from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes, likeliest, without_outliers
 from tribo.lawsearch.grammar import ALL, BOTH, T
 from tribo.lawsearch.model_choice import CLOSE, FoundLaw
 from tribo.lawsearch.search import TAIL_OF_EVIDENCE
@@ -47,15 +47,14 @@ def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypa
     model, pair = campaign(1), ("temperature_C", "humidity_pct")
     search = searched(model, [pair])
     n = model.setup.observations.n
-    weight = np.minimum(model.weight / OUTLIER, 1.0)
-    alone = np.linalg.inv(np.einsum("nji,njk,n->nik", model.factor, model.factor, weight))
+    alone = np.linalg.inv(np.einsum("nji,njk->nik", model.factor, model.factor))
     covariance = np.zeros((n, 2, n, 2))
     covariance[np.arange(n), :, np.arange(n)] = alone
     random = model.setup.dense.reshape(2 * n, -1)
     covariance = covariance.reshape(2 * n, 2 * n) + random @ np.diag(1.0 / model.precision) @ random.T
     inverse, law = np.linalg.inv(covariance), model.jacobian.reshape(2 * n, -1)
     rest = inverse - inverse @ law @ np.linalg.solve(law.T @ inverse @ law, law.T @ inverse)
-    z = model.residual.ravel()
+    z = without_outliers(model).residual.ravel()
     noise = z @ rest @ z / (2 * n)
     for g, scope in enumerate(search.scopes):
         if (scope.acts_on, scope.where) != (T, ALL):
@@ -65,14 +64,14 @@ def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypa
         within = np.eye(course.shape[1]) + course.T @ rest @ course
         pull = course.T @ rest @ z
         expected = 0.5 * (pull @ np.linalg.solve(within, pull) / noise - np.linalg.slogdet(within)[1])
-        found = search.evidence(model.residual[None])[0, 0, g] + search.cost[0, g]
+        found = search.measured[0, g] + search.cost[0, g]
         assert found == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_law_of_one_sample_is_judged_at_the_noise_that_it_leaves_there() -> None:
     model = campaign()
     search = searched(model, free_columns(model.setup.observations.conditions))
-    ((evidence, columns, scope),) = likeliest(search, model.residual, 2)
+    ((evidence, columns, scope),) = likeliest(search, 2)
     assert set(columns) == {"temperature_C", "humidity_pct"}
     assert (scope.regime, scope.where) == (BOTH, "sample A")
     assert evidence > 6 * CLOSE  # at the noise of all samples it would be 10.6
@@ -81,7 +80,7 @@ def test_a_law_of_one_sample_is_judged_at_the_noise_that_it_leaves_there() -> No
 def test_nothing_hidden_speaks_for_a_curve_or_surface_by_odds_of_20_to_1_in_few_campaigns() -> None:
     model = campaign()
     search = searched(model, free_columns(model.setup.observations.conditions))
-    drawn = drawn_residuals(model, np.random.default_rng(4), 60).transpose(0, 2, 1)
+    drawn = drawn_residuals(search.model, np.random.default_rng(4), 60).transpose(0, 2, 1)
     assert (search.evidence(drawn).max(axis=(1, 2)) > CLOSE).mean() < 0.1
 
 

@@ -172,9 +172,9 @@ def _member(
     return evidence, posterior @ (informed * pull), posterior, root
 
 
-def better_left_out(model: ModelFit, with_formula: ModelFit, curve: FreeCurve) -> bool:
-    """Whether a curve predicts tests that were left out better than a formula does, beyond the error of the difference;
-    whole specimens are left out, or tests where there are few.
+def better_left_out(model: ModelFit, with_formula: ModelFit, curve: FreeCurve, least: float = AS_GOOD) -> bool:
+    """Whether a curve predicts tests that were left out better than a formula does, by more than the ``least`` number
+    of standard errors of the difference; whole specimens are left out, or tests where there are few.
 
     ``model`` is the campaign without the law.
     """
@@ -184,4 +184,4 @@ def better_left_out(model: ModelFit, with_formula: ModelFit, curve: FreeCurve) -
     specimen = model.setup.specimen
     fold = (specimen if model.setup.specimens > 2 else np.arange(len(specimen))) % FOLDS
     gained, se = gain_on_groups(with_formula, free, fold)
-    return bool(gained > AS_GOOD * se)
+    return bool(gained > least * se)

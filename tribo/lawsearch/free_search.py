@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from tribo.diagnostics.fit import ModelFit
 from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of
-from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, T, WrittenLaw, scopes_of
+from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, WrittenLaw, scopes_of
 from tribo.lawsearch.scoring import Projection, effects_of, terms_of
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
@@ -25,7 +26,7 @@ OF_SERIES = {"run_order", "specimen_run", "elapsed_s", "clock_h"}  # days, drift
 MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a meaning of their own come first
 NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.15])  # variance that a law leaves where it acts, of that before
 DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface
-OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts less
+OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts no more
 LEAST = 0.1  # of the squared distance that is expected, in proportion to which a law leaves noise
 
 
@@ -48,8 +49,7 @@ class FreeSearch:
         self, model: ModelFit, scopes: Sequence[WrittenLaw], cost: FloatArray, columns: Sequence[tuple[str, ...]]
     ) -> None:
         c = model.setup.observations.conditions
-        # without the law, the tests where it does most lie far off; all but outliers count alike
-        self.model = replace(model, weight=np.minimum(model.weight / OUTLIER, 1.0))
+        self.model = model = without_outliers(model)
         self.scopes, self.columns = tuple(scopes), tuple(columns)
         names = {name for each in columns for name in each}
         beside = max(len(names) - 1, 1)
@@ -86,6 +86,11 @@ class FreeSearch:
             found.append((np.maximum(along, 0.0), course @ directions))
         return found
 
+    @cached_property
+    def measured(self) -> FloatArray:
+        """The evidence of every curve and surface in the campaign itself, (columns, scopes)."""
+        return np.asarray(self.evidence(self.model.residual[None])[0])
+
     def evidence(self, residual: FloatArray) -> FloatArray:
         """Log marginal likelihood of every curve and surface over none, less what its choice costs, for residuals
         (r, n, 2) of ln T, (r, columns, scopes).
@@ -105,6 +110,17 @@ class FreeSearch:
             for f, (along, courses) in enumerate(spectra):
                 found[:, f, g] = _evidence(along, (courses.T @ pull) ** 2 / beyond[g], free[g])
         return found - self.cost
+
+
+def without_outliers(model: ModelFit) -> ModelFit:
+    """The same model with every test counting alike, those that lie far off moved towards it.
+
+    Without a law, the tests where it does most lie far off too: they count in full up to ``OUTLIER``. Campaigns that
+    the model makes itself draw from these tests, so that chance has no more outliers than the campaign.
+    """
+    near = np.minimum(model.weight / OUTLIER, 1.0)
+    residual = model.residual - (1.0 - near)[:, None] * model.left
+    return replace(model, weight=np.ones(len(near)), residual=residual)
 
 
 def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:
@@ -152,31 +168,30 @@ def free_columns(c: Conditions, without: Collection[str] = ()) -> list[tuple[str
     return [*((name,) for name in names), *pairs]
 
 
-def free_scopes(c: Conditions, *, few: bool = False) -> tuple[list[WrittenLaw], FloatArray]:
-    """What curves and surfaces act on, and where, with what the choice of each costs: T or a term of it on all samples,
-    and T on any set of them; with ``few``, on all and on each one."""
+def free_scopes(c: Conditions, few: Collection[WrittenLaw] | None = None) -> tuple[list[WrittenLaw], FloatArray]:
+    """What curves and surfaces act on, and where, with what the choice of each costs: T or a term of it, on all samples
+    or on any set of them. With ``few``, on all, on each one and where these laws act."""
     scopes, cost = scopes_of(c)
-    wheres = ("sample ",) if few else ("sample",)
-    kept = [k for k, s in enumerate(scopes) if s.where == ALL or (s.acts_on == T and s.where.startswith(wheres))]
+    own = {replace(law, shapes=()) for law in few or ()}
+    wheres = (ALL, "sample") if few is None else (ALL, "sample ")
+    kept = [k for k, s in enumerate(scopes) if s.where.startswith(wheres) or s in own]
     return [scopes[k] for k in kept], cost[kept]
 
 
-def certain_pair(search: FreeSearch, residual: FloatArray, by: float) -> tuple[str, ...] | None:
-    """The two columns of the likeliest surface for a residual (n, 2); None where those of another one come as close as
-    ``by`` in net log likelihood, so that the campaign does not say which column is the second."""
-    best = search.evidence(residual[None])[0].max(axis=1)
+def certain_pair(search: FreeSearch, by: float) -> tuple[str, ...] | None:
+    """The two columns of the likeliest surface; None where those of another one come as close as ``by`` in net log
+    likelihood, so that the campaign does not say which column is the second."""
+    best = search.measured.max(axis=1)
     ranked = sorted(
         ((float(e), each) for e, each in zip(best, search.columns, strict=True) if len(each) > 1), reverse=True
     )
     return None if len(ranked) > 1 and ranked[1][0] > ranked[0][0] - by else ranked[0][1]
 
 
-def likeliest(
-    search: FreeSearch, residual: FloatArray, *numbers: int
-) -> list[tuple[float, tuple[str, ...], WrittenLaw]]:
-    """For each of the ``numbers`` of columns, the likeliest curve (one) or surface (two) for a residual (n, 2): its net
-    log likelihood, its columns and its scope; minus infinity where there is none."""
-    every, found = search.evidence(residual[None])[0], []
+def likeliest(search: FreeSearch, *numbers: int) -> list[tuple[float, tuple[str, ...], WrittenLaw]]:
+    """For each of the ``numbers`` of columns, the likeliest curve (one) or surface (two): its net log likelihood, its
+    columns and its scope; minus infinity where there is none."""
+    every, found = search.measured, []
     for number in numbers:
         own = np.where(np.array([len(each) == number for each in search.columns])[:, None], every, -np.inf)
         f, g = np.unravel_index(int(np.argmax(own)), own.shape)

@@ -498,16 +498,15 @@ def scopes_of(c: Conditions) -> tuple[tuple[WrittenLaw, ...], FloatArray]:
         if len(np.unique(c.elongation)) > 1:
             places.append((ELONGATION, float(np.abs(c.elongation).max())))
     everywhere = [(ALL, 1.0, 0.0), *((name, scale, float(np.log(len(places)))) for name, scale in places)]
+    sets = _sets_of_samples(c)
+    everywhere += [(each, 1.0, float(np.log(len(places) + len(sets)))) for each in sets]
     found, costs = [], []
     for regime, chosen in ((BOTH, 0.0), ("static", float(np.log(2))), ("sliding", float(np.log(2)))):
         for acts_on in (T, LOAD_TERM, ADHESION_TERM):
             for where, scale, cost in everywhere:
-                if acts_on == T or where in (ALL, PATTERNED):
+                if acts_on == T or where in (ALL, PATTERNED) or where.startswith("sample"):
                     found.append(WrittenLaw((), acts_on, regime, where, scale))
                     costs.append(chosen + cost if acts_on == T else chosen + cost + float(np.log(2)))
-        sets = _sets_of_samples(c)
-        found += [WrittenLaw((), T, regime, each) for each in sets]
-        costs += [chosen + float(np.log(len(places) + len(sets)))] * len(sets)
     return tuple(found), np.array(costs)
 
 

@@ -22,7 +22,7 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import estimates, gain, informed_share
 from tribo.diagnostics.model import Acting, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
-from tribo.lawsearch.free_curves import FreeCurve, at_knots, better_left_out, curve_of, fitted_curve, knots_of
+from tribo.lawsearch.free_curves import AS_GOOD, FreeCurve, at_knots, better_left_out, curve_of, fitted_curve, knots_of
 from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, certain_pair, free_columns, free_scopes, likeliest
 from tribo.lawsearch.grammar import (
     BOTH,
@@ -208,7 +208,7 @@ def choose_free(
     """A law that no formula shows, found by a ``search`` for curves and surfaces: a surface, or what is best of one
     column."""
     c = model.setup.observations.conditions
-    (alone, (column, *_), _), (apart, columns, scope) = likeliest(search, model.residual, 1, 2)
+    (alone, (column, *_), _), (apart, columns, scope) = likeliest(search, 1, 2)
     if apart > alone:
         surface = _settled_surface(model, _surface(scope, columns, model), without)
         if surface is not None:
@@ -234,21 +234,24 @@ def _with_heights(curve: FreeCurve) -> WrittenLaw:
 
 
 def _likelier_surface(model: ModelFit, at: Background, law: WrittenLaw, without: Collection[str]) -> FreeCurve | None:
-    """A surface of two columns where a campaign speaks for it beyond a law of one, or of two as a formula, and where it
-    predicts tests that were left out better; None elsewhere."""
+    """A surface of two columns where a campaign speaks for it beyond a law of one and it predicts tests that were left
+    out no worse, or in place of a formula of two where it predicts them better; None elsewhere."""
     sets = free_columns(at.conditions, without)
     if set(law.columns) & OF_SERIES or not any(len(each) > 1 for each in sets):
         return None
     left = replace(at.without, residual=at.residual)
-    few = FreeSearch(left, *free_scopes(at.conditions, few=True), [each for each in sets if len(each) > 1])
-    pair = likeliest(few, at.residual, 2)[0][1]
+    few = FreeSearch(left, *free_scopes(at.conditions, (law,)), [each for each in sets if len(each) > 1])
+    pair = likeliest(few, 2)[0][1]
     own = [each for each in sets if set(each) <= {*pair, *law.columns}]
     search = FreeSearch(left, *free_scopes(at.conditions), own)
-    (alone, _, _), (apart, columns, scope) = likeliest(search, at.residual, 1, 2)
+    (alone, _, _), (apart, columns, scope) = likeliest(search, 1, 2)
     if len(law.columns) == 1 and apart < alone + CLOSE:
         return None
     surface = _settled_surface(model, _surface(scope, columns, left), without)
-    return surface if surface is not None and better_left_out(model, at.after, surface) else None
+    if surface is None:
+        return None
+    least = AS_GOOD if len(law.columns) > 1 else -AS_GOOD
+    return surface if better_left_out(model, at.after, surface, least) else None
 
 
 def _settled_surface(model: ModelFit, surface: FreeCurve, without: Collection[str]) -> FreeCurve | None:
@@ -258,12 +261,12 @@ def _settled_surface(model: ModelFit, surface: FreeCurve, without: Collection[st
     for _ in range(ROUNDS):
         at = Background(model, _with_heights(surface))
         left = replace(at.without, residual=at.residual)
-        pair = certain_pair(FreeSearch(left, *free_scopes(at.conditions, few=True), sets), at.residual, CLOSE)
+        pair = certain_pair(FreeSearch(left, *free_scopes(at.conditions, (at.law,)), sets), CLOSE)
         if pair is None:
             return None
         own = [each for each in sets if set(each) <= set(pair)]
         search = FreeSearch(left, *free_scopes(at.conditions), own)
-        (alone, _, _), (apart, columns, scope) = likeliest(search, at.residual, 1, 2)
+        (alone, _, _), (apart, columns, scope) = likeliest(search, 1, 2)
         if apart < alone + CLOSE:
             return None
         surface = _surface(scope, columns, left)
@@ -343,7 +346,7 @@ def _change_of_any_form(at: Background, curve: FreeCurve, without: Collection[st
     if len(curve.law.shapes) == 1 and pairs:
         left = replace(at.without, residual=at.residual)
         search = FreeSearch(left, [scope], np.zeros(1), [(column,), *pairs])
-        alone, *beside = search.evidence(at.residual[None])[0, :, 0]
+        alone, *beside = search.measured[:, 0]
         surfaces = [_surface(scope, each, left) for each, e in zip(pairs, beside, strict=True) if e > alone - IN_REACH]
         curves += surfaces
         evidence += [each.evidence - np.log(len(pairs)) for each in surfaces]
@@ -503,11 +506,10 @@ def _best_forms(model: ModelFit, grammar: Grammar, law: WrittenLaw) -> tuple[Bac
     forms = _forms_at(background, background.projected, grammar)
     shift = {f.best.form: fitted[f.best.form][0] - fitted[best][0] for f in forms if f.best.form in fitted}
     own = next((f for f in forms if f.best.form == best), None)
-    if own is None:
-        return background, forms
-    judged = [replace(f, evidence=own.evidence + shift[f.best.form]) if f.best.form in shift else f for f in forms]
-    ranked = sorted(judged, key=lambda f: (f.best.form != best, -f.evidence))
-    return background if own.best == background.law else Background(model, own.best), ranked
+    if own is not None:
+        judged = [replace(f, evidence=own.evidence + shift[f.best.form]) if f.best.form in shift else f for f in forms]
+        forms = sorted(judged, key=lambda f: (f.best.form != best, -f.evidence))
+    return background if forms[0].best == background.law else Background(model, forms[0].best), forms
 
 
 def _forms_at(at: Background, projected: Projection, grammar: Grammar) -> list[Form]:

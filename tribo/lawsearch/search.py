@@ -90,31 +90,58 @@ def discover_laws(
         if not grammar.courses.shapes:
             break
         scored = _scored(model, grammar)
-        best, _, strongest = scored[0]
+        free = _worth_counting(model, used)
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
-        # after Wilks, the chance that a law gains so much if it is the only one tried: less than that of the best of
-        # all, so that a law which fails here needs no simulated campaigns
-        p, draws = 1.0, (replicates, rng)
-        if float(chdtrc(1, 2.0 * max(strongest, 0.0))) < level:
-            p = SEARCHES * share_beyond(_best_by_chance(model, grammar, strongest, draws, progress), strongest)
-        if p < level:
-            law = choose_form(model, grammar, best, p, rng)
-        elif (free := _worth_counting(model, used)) is not None:
-            likely = float(free.evidence(model.residual[None]).max())
-            chance = _by_chance(model, partial(_likeliest, free), likely, draws, progress)
-            p = SEARCHES * share_beyond(chance, likely, TAIL_OF_EVIDENCE)
-            if p >= level:
-                break
-            law = choose_free(model, free, used, p, rng)
-            if law.model.score - model.score < LIKELY:
-                break  # of tests that lie far off, which the search counts in full, and the fit does not
-        else:
+        draws = Draws(replicates, rng, progress)
+        formula = partial(_law_of_a_formula, model, grammar, scored[0][0], scored[0][2], level, draws)
+        ways = [(scored[0][2], formula)]
+        if free is not None:
+            ways.append((float(free.measured.max()), partial(_law_of_no_formula, model, free, used, level, draws)))
+        # the more telling of the two first: a formula of another column may follow a little of what a curve explains
+        ways.sort(key=lambda way: -way[0])
+        law = next((told for _, way in ways if (told := way()) is not None), None)
+        if law is None:
             break
         if set(law.law.columns) <= TIMES and not _predicts_sessions(model, law.model):
             break
         found.append(law)
         model = law.model
     return Discovery(tuple(found), table, searched)
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Of campaigns that a model makes itself: how many at most, from what, and whom to tell how many are done."""
+
+    replicates: int
+    rng: np.random.Generator
+    progress: Progress | None
+
+
+def _law_of_a_formula(
+    model: ModelFit, grammar: Grammar, best: WrittenLaw, strongest: float, level: float, draws: Draws
+) -> FoundLaw | None:
+    """The law of the best formula where that is beyond chance.
+
+    After Wilks, the chance that a law gains so much if it is the only one tried is less than that of the best of all:
+    a law which fails there needs no simulated campaigns.
+    """
+    if float(chdtrc(1, 2.0 * max(strongest, 0.0))) >= level:
+        return None
+    p = SEARCHES * share_beyond(_best_by_chance(model, grammar, strongest, draws), strongest)
+    return choose_form(model, grammar, best, p, draws.rng) if p < level else None
+
+
+def _law_of_no_formula(
+    model: ModelFit, free: FreeSearch, used: Collection[str], level: float, draws: Draws
+) -> FoundLaw | None:
+    """The law of the likeliest curve or surface where that is beyond chance, and the fit gains from it: the search
+    counts tests that lie far off in full."""
+    likely = float(free.measured.max())
+    chance = _by_chance(free.model, partial(_likeliest, free), likely, draws)
+    p = SEARCHES * share_beyond(chance, likely, TAIL_OF_EVIDENCE)
+    law = choose_free(model, free, used, p, draws.rng) if p < level else None
+    return law if law is not None and law.model.score - model.score >= LIKELY else None
 
 
 def _predicts_sessions(model: ModelFit, with_law: ModelFit) -> bool:
@@ -141,20 +168,14 @@ def _worth_counting(model: ModelFit, without: Collection[str]) -> FreeSearch | N
     columns = free_columns(c, without)
     if not columns:
         return None
-    for few, least in ((True, NEAR), (False, CLOSE)):
-        search = FreeSearch(model, *free_scopes(c, few=few), columns)
-        if search.evidence(model.residual[None]).max() < least:
+    for few, least in (((), NEAR), (None, CLOSE)):
+        search = FreeSearch(model, *free_scopes(c, few), columns)
+        if search.measured.max() < least:
             return None
     return search
 
 
-def _best_by_chance(
-    model: ModelFit,
-    grammar: Grammar,
-    strongest: float,
-    draws: tuple[int, np.random.Generator],
-    progress: Progress | None,
-) -> FloatArray:
+def _best_by_chance(model: ModelFit, grammar: Grammar, strongest: float, draws: Draws) -> FloatArray:
     """The best net score in each of the campaigns that the model makes itself, until they decide on ``strongest``.
 
     All laws are scored at the fitted noise, and the best of them with the noise estimated in each campaign.
@@ -166,7 +187,7 @@ def _best_by_chance(
             index = best_of(net, RESCORED)
             yield float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max())
 
-    return _by_chance(model, best, strongest, draws, progress)
+    return _by_chance(model, best, strongest, draws)
 
 
 def _likeliest(free: FreeSearch, drawn: FloatArray) -> FloatArray:
@@ -175,19 +196,14 @@ def _likeliest(free: FreeSearch, drawn: FloatArray) -> FloatArray:
 
 
 def _by_chance(
-    model: ModelFit,
-    best: Callable[[FloatArray], Iterable[float]],
-    strongest: float,
-    draws: tuple[int, np.random.Generator],
-    progress: Progress | None,
+    model: ModelFit, best: Callable[[FloatArray], Iterable[float]], strongest: float, draws: Draws
 ) -> FloatArray:
     """The ``best`` of each of the campaigns that the model makes itself, until they decide on ``strongest``."""
-    replicates, rng = draws
     chance: list[float] = []
-    while len(chance) < replicates:
-        chance += list(best(drawn_residuals(model, rng, CAMPAIGNS_AT_ONCE)))
-        if progress is not None:
-            progress("discover", len(chance), replicates)
+    while len(chance) < draws.replicates:
+        chance += list(best(drawn_residuals(model, draws.rng, CAMPAIGNS_AT_ONCE)))
+        if draws.progress is not None:
+            draws.progress("discover", len(chance), draws.replicates)
         if decided(np.array(chance), strongest, CAMPAIGNS_AT_ONCE):
             break
     return np.array(chance)
