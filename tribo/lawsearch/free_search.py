@@ -2,8 +2,8 @@
 
 A surface is a Gaussian process over two columns, a course of each and what they do together (an analysis of variance in
 functions: Durrande, Ginsbourger and Roustant, J. Multivariate Anal. 115, 57, 2013). What a campaign says for one is its
-marginal likelihood, averaged over sizes and lengths, less what the choice of the columns and of the scope costs; what
-chance gives the best of all is seen in campaigns that the model makes itself.
+marginal likelihood, averaged over sizes, short lengths and long ones, less what the choice of the columns and of the
+scope costs; what chance gives the best of all is seen in campaigns that the model makes itself.
 """
 
 from __future__ import annotations
@@ -66,9 +66,9 @@ class FreeSearch:
         self.spectra = [self._spectra(rows) for rows in self.rows]
         self.acts_on = np.any(self.rows != 0.0, axis=1)  # which tests, (scopes, n)
 
-    def _spectra(self, rows: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-        """Of each curve and surface in one scope, the information along its principal directions (k,), and these
-        directions as courses over the tests (n, k)."""
+    def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
+        """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
+        principal directions (k,), and these directions as courses over the tests (n, k)."""
         p, n = self.projected, self.projected.n
         border = np.einsum("in,inm->mn", rows, p.border.reshape(2, n, -1))
         specimens = int(p.specimen.max()) + 1
@@ -76,15 +76,15 @@ class FreeSearch:
         own[p.specimen, :, np.arange(n)] = np.einsum("in,ina->na", rows, p.own.reshape(2, n, -1))
         absorbed, square = np.concatenate([border, own.reshape(-1, n)]), np.sum(rows**2, axis=0)
         there = square > 0
-        absorbed = absorbed[:, there]
-        found = []
-        for course in self.courses:
+        absorbed, weight = absorbed[:, there], square[there, None]
+
+        def along_directions(course: FloatArray) -> tuple[FloatArray, FloatArray]:
             here = course[there]
             taken = absorbed @ here
-            information = here.T @ (square[there, None] * here) - taken.T @ taken
-            along, directions = np.linalg.eigh(information)
-            found.append((np.maximum(along, 0.0), course @ directions))
-        return found
+            along, directions = np.linalg.eigh(here.T @ (weight * here) - taken.T @ taken)
+            return np.maximum(along, 0.0), course @ directions
+
+        return [[along_directions(course) for course in courses] for courses in self.courses]
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -107,8 +107,9 @@ class FreeSearch:
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
         for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
             pull = np.einsum("in,inr->nr", rows, left)
-            for f, (along, courses) in enumerate(spectra):
-                found[:, f, g] = _evidence(along, (courses.T @ pull) ** 2 / beyond[g], free[g])
+            for f, short_and_long in enumerate(spectra):
+                each = [_evidence(a, (courses.T @ pull) ** 2 / beyond[g], free[g]) for a, courses in short_and_long]
+                found[:, f, g] = np.logaddexp.reduce(each) - np.log(len(each))
         return found - self.cost
 
 
@@ -137,25 +138,30 @@ def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:
     return np.asarray(mean.max(axis=0))
 
 
-def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> list[FloatArray]:
-    """The principal courses over the tests (n, k) of each curve and surface, each of a standard deviation of one in the
-    process that it comes from."""
-    of_column: dict[tuple[str, int], FloatArray] = {}
+def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> list[list[FloatArray]]:
+    """The principal courses over the tests (n, k) of each curve and surface, of short lengths and of long ones, each of
+    a standard deviation of one in the process that it comes from."""
+    of_column: dict[tuple[str, int], list[FloatArray]] = {}
     for name, alone in {(name, len(each)) for each in columns for name in each}:
         shape = (curve_of(name, c) if alone == 1 else None) or knots_of(name, c)
         assert shape is not None
-        variance, directions = np.linalg.eigh(np.mean(kernels(shape), axis=0))
-        course = at_knots((shape,), c) @ (directions * np.sqrt(np.maximum(variance, 0.0)))
-        of_column[name, alone] = course[:, ::-1][:, : DIRECTIONS[alone]]
-    found: list[FloatArray] = []
+        for covariances in np.split(np.array(kernels(shape)), 2):
+            variance, directions = np.linalg.eigh(np.mean(covariances, axis=0))
+            course = at_knots((shape,), c) @ (directions * np.sqrt(np.maximum(variance, 0.0)))
+            of_column.setdefault((name, alone), []).append(course[:, ::-1][:, : DIRECTIONS[alone]])
+    found = []
     for each in columns:
-        courses = [of_column[name, len(each)] for name in each]
-        if len(each) > 1:
-            with_one = [np.column_stack([np.ones(len(course)), course]) for course in courses]
-            together = with_one[0][:, :, None] * with_one[1][:, None, :]
-            courses = [together.reshape(len(together), -1)[:, 1:]]
-        found.append(courses[0])
+        short_and_long = zip(*(of_column[name, len(each)] for name in each), strict=True)
+        found.append([_together(courses) for courses in short_and_long])
     return found
+
+
+def _together(courses: Sequence[FloatArray]) -> FloatArray:
+    """The courses (n, k) of one column, or those of two with their products."""
+    if len(courses) == 1:
+        return courses[0]
+    one, other = (np.column_stack([np.ones(len(course)), course]) for course in courses)
+    return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)[:, 1:]
 
 
 def free_columns(c: Conditions, without: Collection[str] = ()) -> list[tuple[str, ...]]:

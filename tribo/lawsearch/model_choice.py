@@ -20,7 +20,7 @@ from tribo.diagnostics.contrasts import FORM
 from tribo.diagnostics.effect_sizes import NORMAL_90
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import estimates, gain, informed_share
-from tribo.diagnostics.model import Acting, effect_of
+from tribo.diagnostics.model import Acting, Target, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
 from tribo.lawsearch.free_curves import AS_GOOD, FreeCurve, at_knots, better_left_out, curve_of, fitted_curve, knots_of
 from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, certain_pair, free_columns, free_scopes, likeliest
@@ -111,8 +111,12 @@ class Background:
         acting = Acting(law.mechanism())
         after = fit(model.setup, (*model.acting, acting), start=model)
         self.law, self.after, self.setup, self.terms = law, after, after.setup, terms_of(after)
-        self.without = replace(after, jacobian=after.jacobian[:, :, : -len(acting.mechanism.parameters)])
-        self.residual = after.residual + effect_of(after.setup, after.law, acting, after.values[-1])
+        # without the law, linear about the same law and mechanisms: where a term of T is changed, their derivatives are
+        # others than with it
+        target, x = Target(after.setup, model.acting), np.concatenate([after.law, *after.values[:-1]])
+        self.residual = target.residual(x)
+        jacobian = target.jacobian(x, after.setup.observations.log_force - self.residual)
+        self.without = replace(after, jacobian=jacobian)
         self.informed = informed_share(after.noise)
 
     @cached_property
@@ -205,15 +209,11 @@ def choose_form(model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, 
 def choose_free(
     model: ModelFit, search: FreeSearch, without: Collection[str], p: float, rng: np.random.Generator
 ) -> FoundLaw:
-    """A law that no formula shows, found by a ``search`` for curves and surfaces: a surface, or what is best of one
-    column."""
-    c = model.setup.observations.conditions
-    (alone, (column, *_), _), (apart, columns, scope) = likeliest(search, 1, 2)
-    if apart > alone:
-        surface = _settled_surface(model, _surface(scope, columns, model), without)
-        if surface is not None:
-            return _by_curve(model, surface, without, p, rng)
-    grammar = Grammar(model, without, [each for each in shapes_of(c) if {s.column for s in each[0]} == {column}])
+    """The law of the column or the two columns of the likeliest curve or surface of a ``search``: what tells it best."""
+    (alone, column, _), (apart, pair, _) = likeliest(search, 1, 2)
+    own = set(pair if apart > alone else column)
+    shapes = [each for each in shapes_of(model.setup.observations.conditions) if {s.column for s in each[0]} <= own]
+    grammar = Grammar(model, without, shapes)
     net = grammar.net(Projection(model, model.residual[None]))[0]
     return choose_form(model, grammar, grammar.law(int(np.argmax(net))), p, rng)
 
