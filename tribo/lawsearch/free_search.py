@@ -27,7 +27,7 @@ MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a m
 NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.15])  # variance that a law leaves where it acts, of that before
 DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface
 OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts no more
-LEAST = 0.1  # of the squared distance that is expected, in proportion to which a law leaves noise
+LEAST = 0.1  # of the square that is expected, in proportion to which a law leaves noise
 
 
 class FreeSearch:
@@ -65,6 +65,9 @@ class FreeSearch:
         )  # fmt: skip
         self.spectra = [self._spectra(rows) for rows in self.rows]
         self.acts_on = np.any(self.rows != 0.0, axis=1)  # which tests, (scopes, n)
+        p = self.projected
+        # expected square of what the model does not absorb of both numbers of every test, (n,)
+        self.not_absorbed = (1.0 - np.sum(p.own**2, axis=1) - np.sum(p.border**2, axis=1)).reshape(2, -1).sum(axis=0)
 
     def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
@@ -95,15 +98,14 @@ class FreeSearch:
         """Log marginal likelihood of every curve and surface over none, less what its choice costs, for residuals
         (r, n, 2) of ln T, (r, columns, scopes).
 
-        What a law explains is not noise: each is judged at the noise that it leaves, in proportion to that of the
-        model, on the samples where it acts.
+        What a law explains is not noise: each is judged at the noise that it leaves, in proportion to what the model
+        leaves unabsorbed on the samples where it acts.
         """
         projected = Projection(self.model, residual)
         left = projected.left.reshape(2, projected.n, -1)
-        # squared distances of every test from none, by the covariance of noise and random effects, (n, r)
-        distances = np.sum(projected.right.reshape(left.shape) * left, axis=0)
+        squares = self.acts_on @ np.sum(left**2, axis=0)
         free = 2.0 * self.acts_on.sum(axis=1)
-        beyond = np.maximum(self.acts_on @ distances / free[:, None], LEAST)
+        beyond = np.maximum(squares / (self.acts_on @ self.not_absorbed)[:, None], LEAST)
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
         for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
             pull = np.einsum("in,inr->nr", rows, left)

@@ -209,7 +209,7 @@ def choose_form(model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, 
 def choose_free(
     model: ModelFit, search: FreeSearch, without: Collection[str], p: float, rng: np.random.Generator
 ) -> FoundLaw:
-    """The law of the column or the two columns of the likeliest curve or surface of a ``search``: what tells it best."""
+    """The law of the column, or of both, of the likeliest curve or surface of a ``search``, as what tells it best."""
     (alone, column, _), (apart, pair, _) = likeliest(search, 1, 2)
     own = set(pair if apart > alone else column)
     shapes = [each for each in shapes_of(model.setup.observations.conditions) if {s.column for s in each[0]} <= own]
