@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 from blind.tribometer import Design
 
 from tribo.diagnostics.contrasts import share_beyond
-from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.model import Setup
-from tribo.diagnostics.replicates import drawn_residuals
-from tribo.lawsearch import free_search, search
+from tribo.diagnostics.fit import ModelFit, whitened
+from tribo.diagnostics.model import Setup, log_forces
+from tribo.diagnostics.replicates import drawn_residuals, standardised
+from tribo.lawsearch import free_search, model_choice, search
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes, likeliest, without_outliers
-from tribo.lawsearch.grammar import ALL, BOTH, T
-from tribo.lawsearch.model_choice import CLOSE, FoundLaw
+from tribo.lawsearch.grammar import ADHESION_TERM, ALL, BOTH, T, WrittenLaw
+from tribo.lawsearch.model_choice import CLOSE, Background, Form, FoundLaw
+from tribo.lawsearch.scoring import Grammar
 from tribo.lawsearch.search import TAIL_OF_EVIDENCE
 from tribo.records import REGIMES
+from tribo.wording.law_sentences import law_sentence
 
-from .known import baseline, made
+from .known import LAW, baseline, made
 
 SIZE = 0.1
 
@@ -118,3 +121,68 @@ def test_a_curve_from_which_the_fit_gains_nothing_is_no_law(monkeypatch: pytest.
     chosen = search.choose_free
     monkeypatch.setattr(search, "choose_free", lambda *given: replace(chosen(*given), model=model))
     assert found() == ()
+
+
+def adhesion_of_two_samples(s: Setup) -> np.ndarray:
+    """The adhesion of two samples is higher by a half where it is warm, and lower by as much where it is cold."""
+    c = s.observations.conditions
+    base = s.base(LAW)
+    share = np.exp(log_forces(base.forces(np.zeros(s.observations.n))) - log_forces(base.forces(c.normal_load_N)))
+    course = 0.5 * np.tanh((c.temperature_C - 23.0) / 0.3) * np.isin(c.sample, ["A", "Sx"])
+    return np.log1p(share * np.expm1(course)[:, None])
+
+
+@cache
+def with_law_of_the_adhesion() -> tuple[ModelFit, FoundLaw]:
+    """The campaign without the law, and the law."""
+    design = Design(samples=("F", "A", "B", "Sx"), repeats=2)
+    model = baseline(made(adhesion_of_two_samples, seed=2, design=design))
+    (law,) = search.discover_laws(model, level=0.003, replicates=20).laws
+    return model, law
+
+
+def test_a_law_of_the_adhesion_of_two_samples_is_told_as_that() -> None:
+    _, law = with_law_of_the_adhesion()
+    assert (law.law.columns, law.law.acts_on, law.law.where) == (("temperature_C",), ADHESION_TERM, "samples A + Sx")
+    assert law_sentence(law).startswith("The adhesion term of friction of samples A, Sx is higher ")
+
+
+def test_without_a_law_of_the_adhesion_the_flat_law_takes_up_all_of_a_constant() -> None:
+    model, law = with_law_of_the_adhesion()
+    at = Background(model, law.law)
+    constant = at.effects(WrittenLaw((), ADHESION_TERM))[0][:, :, None]
+    left = at.without.cleared(constant)[0]
+    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(whitened(at.without.factor, constant))
+
+
+def test_outliers_of_a_campaign_are_no_further_off_in_those_that_it_makes_itself() -> None:
+    """A test far off has little weight in a campaign; drawn into another one, it would have all of it."""
+    model = baseline(made(lambda s: outliers(s.observations.n), seed=3, design=Design(samples=("F", "A", "B", "Sx"))))
+    near = without_outliers(model)
+    furthest = [np.sqrt(np.sum(standardised(f) ** 2, axis=1)).max() for f in (model, near)]
+    assert furthest[0] > 10.0
+    assert furthest[1] < 6.0
+
+
+def outliers(n: int) -> np.ndarray:
+    """Three tests that lie far off."""
+    return np.where(np.arange(n) % (n // 3) == 1, 1.5, 0.0)[:, None] * np.ones(2)
+
+
+def test_the_form_that_is_told_is_the_one_that_was_fitted_also_where_the_best_is_out_of_reach(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model, calls = campaign(1), 0
+
+    def without_the_best(*given: Any) -> list[Form]:
+        nonlocal calls
+        calls += 1
+        forms = of_all(*given)
+        return forms[1:] if calls == 3 else forms
+
+    of_all = model_choice._forms_at
+    monkeypatch.setattr(model_choice, "ROUNDS", 1)
+    monkeypatch.setattr(model_choice, "_forms_at", without_the_best)
+    background, forms = model_choice.forms_in_reach(model, Grammar(model))
+    assert calls == 3
+    assert background.law == forms[0].best
