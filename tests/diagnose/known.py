@@ -12,6 +12,8 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import Acting, Setup, predict, setup, start_changes
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
+from tribo.lawsearch.grammar import corrects_a_pattern
+from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.mechanisms import MECHANISMS
 from tribo.records import Ingested
 
@@ -51,3 +53,10 @@ def contrasts_of(f: ModelFit) -> list[Contrast]:
     """Every contrast of a fitted model."""
     candidates, courses, _ = start_changes(f.setup, f.law)
     return all_contrasts(f.setup, f.law, candidates, courses)
+
+
+def net_of(laws: Grammar, projected: Projection) -> np.ndarray:
+    """What each law gains less its cost, (r, laws); those that correct a pattern are none."""
+    found = projected.gains(laws.courses, laws.acts) - laws.courses.cost - laws.scope_cost[:, None]
+    found[:, corrects_a_pattern(laws.scopes, laws.courses.shapes)] = -np.inf
+    return found.reshape(len(found), -1)

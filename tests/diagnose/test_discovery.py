@@ -35,7 +35,7 @@ from tribo.lawsearch.grammar import (
 from tribo.lawsearch.known_laws import KnownLaw, law_text, read_law, validate_law, why_not_testable
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.scoring import Grammar, Projection
-from tribo.lawsearch.search import RESCORED, Discovery, best_of, discover_laws
+from tribo.lawsearch.search import RESCORED, Discovery, discover_laws
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions
 from tribo.wording.law_sentences import discovery_sentence, held_sentence, law_sentence, size_sentence
@@ -43,7 +43,7 @@ from tribo.wording.part_sentences import layer_sentence, misfit_sentence, next_t
 from tribo.wording.verdict_sentences import verdict_in_words, worded
 
 from .examined import Once, examined
-from .known import acting, baseline, made
+from .known import acting, baseline, made, net_of
 
 
 def warm_is_best(s: Setup) -> np.ndarray:
@@ -75,7 +75,7 @@ def test_a_law_of_the_pressure_alone_acts_on_several_patterns_or_on_none() -> No
     model = baseline(made(nothing, seed=3))
     grammar = Grammar(model, ())
     shapes, groups = grammar.courses.shapes, grammar.scopes
-    net = grammar.net(Projection(model, model.residual[None]))[0].reshape(len(groups), len(shapes))
+    net = net_of(grammar, Projection(model, model.residual[None]))[0].reshape(len(groups), len(shapes))
     allowed = {
         groups[g].where
         for g, k in zip(*np.nonzero(np.isfinite(net)), strict=True)
@@ -263,11 +263,9 @@ def test_the_best_law_by_the_fitted_noise_is_among_those_scored_anew() -> None:
     rng = np.random.default_rng(3)
     drawn = drawn_residuals(model, rng, 1)
     laws = Grammar(model, ())
-    nets = laws.net(Projection(model, drawn.transpose(0, 2, 1)))
     every = np.arange(laws.size)
     made_again = refit(model, drawn)
-    for k, net in enumerate(nets):
-        best = best_of(net, RESCORED)
+    for k, best in enumerate(laws.best(Projection(model, drawn.transpose(0, 2, 1)), RESCORED)):
         exact = np.concatenate(
             [laws.gains(made_again.one(k), part)[0] - laws.cost(part) for part in np.array_split(every, 12)]
         )

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from tribo.diagnostics.fit import ModelFit
+from tribo.lawsearch import scoring
 from tribo.lawsearch.grammar import fine_shapes, refined_shapes, shapes_of
 from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.mechanisms.record import Conditions
 
-from .known import baseline, made
+from .known import baseline, made, net_of
 from .test_known_laws import nothing
 
 
@@ -26,7 +27,7 @@ def conditions(model: ModelFit) -> Conditions:
 
 def test_laws_scored_together_score_as_each_does_alone(model: ModelFit) -> None:
     laws = Grammar(model, ())
-    together = laws.net(Projection(model, model.residual[None]))[0]
+    together = net_of(laws, Projection(model, model.residual[None]))[0]
     two_columns = np.isin(np.arange(laws.size) % len(laws.courses.shapes), laws.courses.two)
     one_column = np.flatnonzero(~two_columns & np.isfinite(together))  # no corrections of a pattern
     some = one_column[:: len(one_column) // 60]
@@ -35,6 +36,15 @@ def test_laws_scored_together_score_as_each_does_alone(model: ModelFit) -> None:
     left, residual = model.cleared(np.stack(columns, axis=2))
     alone = 0.5 * (left.T @ residual) ** 2 / np.sum(left**2, axis=0) - laws.cost(some)
     assert together[some] == pytest.approx(alone, abs=1e-6)
+
+
+def test_the_best_laws_are_those_of_all_scored_at_once(model: ModelFit, monkeypatch: pytest.MonkeyPatch) -> None:
+    laws = Grammar(model, ())
+    residual = np.stack([model.residual, model.residual[::-1]])
+    every = net_of(laws, Projection(model, residual))
+    monkeypatch.setattr(scoring, "COLUMNS_AT_ONCE", 70)
+    for net, best in zip(every, laws.best(Projection(model, residual), 30), strict=True):
+        assert np.sort(net[best]) == pytest.approx(np.sort(net)[-30:], abs=1e-9)
 
 
 def test_a_wave_gains_what_its_sine_and_cosine_gain_together(model: ModelFit) -> None:

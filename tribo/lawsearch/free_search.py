@@ -71,7 +71,7 @@ class FreeSearch:
 
     def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
-        principal directions (k,), and these directions as courses over the tests (n, k)."""
+        principal directions (k,), and these directions (k, k) in its courses."""
         p, n = self.projected, self.projected.n
         border = np.einsum("in,inm->mn", rows, p.border.reshape(2, n, -1))
         specimens = int(p.specimen.max()) + 1
@@ -85,7 +85,7 @@ class FreeSearch:
             here = course[there]
             taken = absorbed @ here
             along, directions = np.linalg.eigh(here.T @ (weight * here) - taken.T @ taken)
-            return np.maximum(along, 0.0), course @ directions
+            return np.maximum(along, 0.0), directions
 
         return [[along_directions(course) for course in courses] for courses in self.courses]
 
@@ -109,8 +109,11 @@ class FreeSearch:
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
         for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
             pull = np.einsum("in,inr->nr", rows, left)
-            for f, short_and_long in enumerate(spectra):
-                each = [_evidence(a, (courses.T @ pull) ** 2 / beyond[g], free[g]) for a, courses in short_and_long]
+            for f, (courses, short_and_long) in enumerate(zip(self.courses, spectra, strict=True)):
+                each = [
+                    _evidence(along, (directions.T @ (course.T @ pull)) ** 2 / beyond[g], free[g])
+                    for course, (along, directions) in zip(courses, short_and_long, strict=True)
+                ]
                 found[:, f, g] = np.logaddexp.reduce(each) - np.log(len(each))
         return found - self.cost
 

@@ -30,6 +30,7 @@ UNITS = {
 }  # fmt: skip
 LARGEST = 3.0  # of an amplitude in ln T
 AMPLITUDES = "abcde"  # of a wave two, of levels one less than there are values
+MOST_SETS = 30  # sets of samples, of up to seven, on which terms of T are looked at: memory and time grow with them
 MOST_VALUES = len(AMPLITUDES) + 1  # of a column that is told by its values
 
 
@@ -500,11 +501,12 @@ def scopes_of(c: Conditions) -> tuple[tuple[WrittenLaw, ...], FloatArray]:
     everywhere = [(ALL, 1.0, 0.0), *((name, scale, float(np.log(len(places)))) for name, scale in places)]
     sets = _sets_of_samples(c)
     everywhere += [(each, 1.0, float(np.log(len(places) + len(sets)))) for each in sets]
+    few = (ALL, PATTERNED, *(f"sample {name}" for name in samples), *(sets if len(sets) <= MOST_SETS else ()))
     found, costs = [], []
     for regime, chosen in ((BOTH, 0.0), ("static", float(np.log(2))), ("sliding", float(np.log(2)))):
         for acts_on in (T, LOAD_TERM, ADHESION_TERM):
             for where, scale, cost in everywhere:
-                if acts_on == T or where in (ALL, PATTERNED) or where.startswith("sample"):
+                if acts_on == T or where in few:
                     found.append(WrittenLaw((), acts_on, regime, where, scale))
                     costs.append(chosen + cost if acts_on == T else chosen + cost + float(np.log(2)))
     return tuple(found), np.array(costs)

@@ -214,8 +214,8 @@ def choose_free(
     own = set(pair if apart > alone else column)
     shapes = [each for each in shapes_of(model.setup.observations.conditions) if {s.column for s in each[0]} <= own]
     grammar = Grammar(model, without, shapes)
-    net = grammar.net(Projection(model, model.residual[None]))[0]
-    return choose_form(model, grammar, grammar.law(int(np.argmax(net))), p, rng)
+    ((first,),) = grammar.best(Projection(model, model.residual[None]), 1)
+    return choose_form(model, grammar, grammar.law(first), p, rng)
 
 
 def _surface(scope: WrittenLaw, columns: Sequence[str], without: ModelFit) -> FreeCurve:

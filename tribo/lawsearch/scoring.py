@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -164,27 +164,29 @@ class Projection:
     def gains(self, courses: Courses, acts: Acts) -> FloatArray:
         """Log likelihood gained by each course in each scope at its best amplitude, (r, scopes, k); the second
         amplitude of a wave costs one unit."""
-        scopes, k = len(acts[0][1]), courses.first.shape[1]
-        found = np.empty((self.left.shape[1], scopes, k))
-        of_two = []
-        for start in range(0, k, COLUMNS_AT_ONCE):  # hundreds of columns have a hundred million laws
-            end = start + COLUMNS_AT_ONCE
-            own, pull = self.products(courses.first[:, start:end], acts)
-            found[:, :, start:end] = 0.5 * pull**2 / own
-            two = courses.two[(courses.two >= start) & (courses.two < end)] - start
-            of_two.append((own[:, two], pull[:, :, two]))
-        if len(courses.two):
-            own1, pull1 = (np.concatenate(each, axis=-1) for each in zip(*of_two, strict=True))
-            own2, pull2 = self.products(courses.second, acts)
-            both, _ = self.products(courses.first[:, courses.two] + courses.second, acts)
-            with np.errstate(invalid="ignore"):
-                mixed = 0.5 * (both - own1 - own2)
-                determinant = own1 * own2 - mixed**2
-                together = 0.5 * (own2 * pull1**2 - 2 * mixed * pull1 * pull2 + own1 * pull2**2) / determinant
-            single = np.maximum(0.5 * pull1**2 / own1, 0.5 * pull2**2 / own2)
-            good = np.isfinite(determinant) & (determinant > 1e-6 * np.abs(own1 * own2))
-            found[:, :, courses.two] = np.where(good, together, single) - 1.0
-        return found
+        return np.concatenate([found for _, found in self.gains_in_parts(courses, acts)], axis=2)
+
+    def gains_in_parts(self, courses: Courses, acts: Acts) -> Iterator[tuple[slice, FloatArray]]:
+        """The same for some of the courses after the other, as many campaigns and scopes fill a memory: which, and
+        their gains."""
+        for start in range(0, courses.first.shape[1], COLUMNS_AT_ONCE):
+            part = slice(start, start + COLUMNS_AT_ONCE)
+            own, pull = self.products(courses.first[:, part], acts)
+            found = 0.5 * pull**2 / own
+            waves = np.flatnonzero((courses.two >= part.start) & (courses.two < part.stop))
+            if len(waves):
+                two = courses.two[waves] - start
+                both = courses.first[:, courses.two[waves]] + courses.second[:, waves]
+                own1, pull1 = own[:, two], pull[:, :, two]
+                own2, pull2 = self.products(courses.second[:, waves], acts)
+                with np.errstate(invalid="ignore"):
+                    mixed = 0.5 * (self.products(both, acts)[0] - own1 - own2)
+                    determinant = own1 * own2 - mixed**2
+                    together = 0.5 * (own2 * pull1**2 - 2 * mixed * pull1 * pull2 + own1 * pull2**2) / determinant
+                single = np.maximum(0.5 * pull1**2 / own1, 0.5 * pull2**2 / own2)
+                good = np.isfinite(determinant) & (determinant > 1e-6 * np.abs(own1 * own2))
+                found[:, :, two] = np.where(good, together, single) - 1.0
+            yield part, found
 
     def products(self, columns: FloatArray, acts: Acts) -> tuple[FloatArray, FloatArray]:
         """Information (scopes, k), inf where nothing is left, and pull (r, scopes, k) of columns (n, k)."""
@@ -273,13 +275,20 @@ class Grammar:
     def size(self) -> int:
         return len(self.scopes) * len(self.courses.shapes)
 
-    def net(self, projected: Projection) -> FloatArray:
-        """What each law gains less its cost, (r, laws)."""
-        found = projected.gains(self.courses, self.acts)
-        found -= self.courses.cost
-        found -= self.scope_cost[:, None]
-        found[:, corrects_a_pattern(self.scopes, self.courses.shapes)] = -np.inf
-        return found.reshape(len(found), -1)
+    def best(self, projected: Projection, n: int) -> list[Index]:
+        """The n laws that gain most less their cost in each campaign, in no order."""
+        values, found = np.empty((0, 0)), np.empty((0, 0), np.int64)
+        own = corrects_a_pattern(self.scopes, self.courses.shapes)
+        for part, gains in projected.gains_in_parts(self.courses, self.acts):
+            net = np.where(own[:, part], -np.inf, gains - self.courses.cost[part] - self.scope_cost[:, None])
+            scope, shape = np.divmod(np.arange(net[0].size), net.shape[2])
+            index = np.broadcast_to(scope * len(self.courses.shapes) + part.start + shape, (len(net), net[0].size))
+            values = np.concatenate([values.reshape(len(net), -1), net.reshape(len(net), -1)], axis=1)
+            found = np.concatenate([found.reshape(len(net), -1), index], axis=1)
+            if values.shape[1] > n:
+                kept = np.argpartition(-values, n - 1, axis=1)[:, :n]
+                values, found = np.take_along_axis(values, kept, 1), np.take_along_axis(found, kept, 1)
+        return list(found)
 
     def law(self, index: int) -> WrittenLaw:
         scope, shape = divmod(int(index), len(self.courses.shapes))

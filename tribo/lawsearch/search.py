@@ -18,7 +18,7 @@ from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes
 from tribo.lawsearch.grammar import WrittenLaw
 from tribo.lawsearch.model_choice import CLOSE, FoundLaw, choose_form, choose_free
-from tribo.lawsearch.scoring import Grammar, Index, Projection
+from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -153,8 +153,7 @@ def _predicts_sessions(model: ModelFit, with_law: ModelFit) -> bool:
 
 def _scored(model: ModelFit, grammar: Grammar) -> list[tuple[WrittenLaw, float, float]]:
     """The best laws of the campaign, scored with its own noise, the best first."""
-    net = grammar.net(Projection(model, model.residual[None]))[0]
-    index = best_of(net, RESCORED_MEASURED)
+    (index,) = grammar.best(Projection(model, model.residual[None]), RESCORED_MEASURED)
     gains = grammar.gains(as_measured(model), index)[0]
     nets = gains - grammar.cost(index)
     each = zip(index, gains, nets, strict=True)
@@ -183,8 +182,7 @@ def _best_by_chance(model: ModelFit, grammar: Grammar, strongest: float, draws: 
 
     def best(drawn: FloatArray) -> Iterator[float]:
         made = refit(model, drawn)
-        for k, net in enumerate(grammar.net(Projection(model, drawn.transpose(0, 2, 1)))):
-            index = best_of(net, RESCORED)
+        for k, index in enumerate(grammar.best(Projection(model, drawn.transpose(0, 2, 1)), RESCORED)):
             yield float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max())
 
     return _by_chance(model, best, strongest, draws)
@@ -207,9 +205,3 @@ def _by_chance(
         if decided(np.array(chance), strongest, CAMPAIGNS_AT_ONCE):
             break
     return np.array(chance)
-
-
-def best_of(net: FloatArray, n: int) -> Index:
-    """The places of the n largest, in no order."""
-    n = min(n, len(net))
-    return np.asarray(np.argpartition(-net, n - 1)[:n])
