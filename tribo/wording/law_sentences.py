@@ -203,7 +203,8 @@ def law_test(difference: Difference, law: WrittenLaw, other: WrittenLaw, design:
     if difference == "columns":
         apart = set(law.columns) ^ set(other.columns)
         varied = dict.fromkeys(in_words(name) for name in (*law.columns, *other.columns) if name in apart)
-        return f"Vary {' and '.join(varied)} independently of each other and of all other conditions"
+        of_each_other = "of each other and " if len(varied) > 1 else ""
+        return f"Vary {' and '.join(varied)} independently {of_each_other}of all other conditions"
     if difference == "samples":
         return f"{vary} on sample {design['sample']} alone, at one load"
     if difference == "terms":
