@@ -93,6 +93,7 @@ def test_laws_of_the_two_pressures_are_told_apart_at_equal_contact_pressures() -
     conditions = baseline(made(nothing, seed=1)).setup.observations.conditions
     assert "at equal contact pressures" in next_test_sentence(separating_test(one, other, conditions))
 
+
 def test_the_one_column_by_which_two_laws_differ_is_varied_by_itself() -> None:
     warm, worn = Shape("linear", "temperature_C", 20.0, 26.0), Shape("linear", "run_order", 1.0, 40.0)
     conditions = baseline(made(nothing, seed=1)).setup.observations.conditions
@@ -100,7 +101,6 @@ def test_the_one_column_by_which_two_laws_differ_is_varied_by_itself() -> None:
     assert "Vary the run order independently of all other conditions" in said
     said = next_test_sentence(separating_test(WrittenLaw((warm,)), WrittenLaw((worn,)), conditions))
     assert "Vary the temperature and the run order independently of each other and of all other conditions" in said
-
 
 
 def nothing(s: Setup) -> np.ndarray:

@@ -109,9 +109,8 @@ def damp_tests_lifted(s: Setup) -> np.ndarray:
 
 
 def test_a_curve_from_which_the_fit_gains_nothing_is_no_law(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search counts tests that lie far off in full, the fit does not."""
+    """The search counts tests that lie far off more than the fit does."""
     model = baseline(made(damp_tests_lifted, seed=3, design=Design(samples=("F", "A", "B", "Sx"), repeats=1)))
-
     monkeypatch.setattr(search, "_law_of_a_formula", lambda *given: None)
 
     def found() -> tuple[FoundLaw, ...]:

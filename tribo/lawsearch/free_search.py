@@ -150,9 +150,10 @@ def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> lis
     for name, alone in {(name, len(each)) for each in columns for name in each}:
         shape = (curve_of(name, c) if alone == 1 else None) or knots_of(name, c)
         assert shape is not None
+        at = at_knots((shape,), c)
         for covariances in np.split(np.array(kernels(shape)), 2):
             variance, directions = np.linalg.eigh(np.mean(covariances, axis=0))
-            course = at_knots((shape,), c) @ (directions * np.sqrt(np.maximum(variance, 0.0)))
+            course = at @ (directions * np.sqrt(np.maximum(variance, 0.0)))
             of_column.setdefault((name, alone), []).append(course[:, ::-1][:, : DIRECTIONS[alone]])
     found = []
     for each in columns:

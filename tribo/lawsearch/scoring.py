@@ -167,8 +167,8 @@ class Projection:
         return np.concatenate([found for _, found in self.gains_in_parts(courses, acts)], axis=2)
 
     def gains_in_parts(self, courses: Courses, acts: Acts) -> Iterator[tuple[slice, FloatArray]]:
-        """The same for some of the courses after the other, as many campaigns and scopes fill a memory: which, and
-        their gains."""
+        """The same in parts, so that not all gains of many campaigns are held at once: which courses, and their
+        gains."""
         for start in range(0, courses.first.shape[1], COLUMNS_AT_ONCE):
             part = slice(start, start + COLUMNS_AT_ONCE)
             own, pull = self.products(courses.first[:, part], acts)

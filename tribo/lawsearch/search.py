@@ -136,7 +136,7 @@ def _law_of_no_formula(
     model: ModelFit, free: FreeSearch, used: Collection[str], level: float, draws: Draws
 ) -> FoundLaw | None:
     """The law of the likeliest curve or surface where that is beyond chance, and the fit gains from it: the search
-    counts tests that lie far off in full."""
+    counts tests that lie far off more than the fit does."""
     likely = float(free.measured.max())
     chance = _by_chance(free.model, partial(_likeliest, free), likely, draws)
     p = SEARCHES * share_beyond(chance, likely, TAIL_OF_EVIDENCE)
