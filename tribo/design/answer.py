@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import softmax
 
 from tribo.berardo2019.published_tables import load_table2, load_table2_simulated_anew
 from tribo.design import rounds
@@ -293,12 +294,13 @@ def lessons_of(measured: Sequence[Measured], all_rounds: Rounds, base: SimConfig
     return found
 
 
-# A correction has a part that all patterns share, and one that is alike for neighbours of a family. The share of the
-# first and the reach of the second, in ln of the lengths and in the area fraction, lie between those of the patterns of
-# the paper (0.3 and 0.5, the most likely at 10 kPa) and those of changes of the open parameters of the model (up to 0.9
-# and 2.9 in `benchmarks/design_exam.py reach`, with room above). Every pair is weighed by its likelihood for the
-# patterns of the paper and for those that were measured.
+# A correction has a part that all patterns share, one that those of a family share, and one that is alike for
+# neighbours. The share of the first and the reach of the last, in ln of the lengths and in the area fraction, lie
+# between those of the patterns of the paper (0.3 and 0.5, the most likely at 10 kPa) and those of changes of the open
+# parameters of the model (up to 0.9 and 2.9 in `benchmarks/design_exam.py reach`, with room above). What those of a
+# family share of the rest is not known: `benchmarks/design_exam.py carried` shows what it does.
 SHARES = np.linspace(0.3, 0.9, 7)
+SHARES_OF_FAMILY = np.array([0.3, 0.6, 0.9])
 REACHES = np.geomspace(0.5, 4.0, 7)
 LEAST_NOISE = 1e-3  # of ln(T/N), so that equal patterns can be solved for
 OWN_SHAPES = ("A", "B", "C", "Sx")  # Sy has the shape of Sx
@@ -312,16 +314,21 @@ def place_of(pattern: Pattern) -> tuple[tuple[object, ...], FloatArray]:
 
 
 def likenesses(one: Sequence[Pattern], other: Sequence[Pattern]) -> FloatArray:
-    """How alike the own parts of two rows of patterns are, 1 for the same pattern, 0 for other families; by reach."""
+    """How alike two rows of patterns are beyond what all share, 1 for the same pattern, 0 for other families.
+
+    Of shape (shares of a family, reaches, n, m).
+    """
     a, b = [place_of(p) for p in one], [place_of(p) for p in other]
     same = np.array([[f == g for g, _ in b] for f, _ in a], float)
     x, y = np.array([x for _, x in a]), np.array([y for _, y in b])
-    return np.array([same * kernel(x, y, np.full(x.shape[1], reach)) for reach in REACHES])
+    near = np.array([kernel(x, y, np.full(x.shape[1], reach)) for reach in REACHES])
+    of_family = SHARES_OF_FAMILY[:, None, None, None]
+    return np.asarray(same * (of_family + (1 - of_family) * near))
 
 
 def mixed(likeness: FloatArray) -> FloatArray:
-    """Correlations of corrections, (shares, reaches, n, m), from how alike the own parts are."""
-    shares = SHARES[:, None, None, None]
+    """Correlations of corrections, (shares, shares of a family, reaches, n, m), from how alike patterns are."""
+    shares = SHARES[:, None, None, None, None]
     return np.asarray(shares + (1 - shares) * likeness)
 
 
@@ -335,12 +342,15 @@ def log_likelihood(correlation: FloatArray, y: FloatArray) -> FloatArray:
 class Learnt:
     """What campaigns on earlier designs say of the model: a Gaussian process of ln(measured over predicted).
 
-    ``prior`` is its mean and standard deviation by regime before; ``weights`` are those of every share and reach.
+    ``prior`` is its mean and standard deviation by regime before. ``weights`` are those of every share and reach by
+    what was measured: they give the correction. ``weights_of_paper`` count the patterns of the paper as well, whose
+    errors differ more from pattern to pattern: they give the doubt that is left.
     """
 
     lessons: dict[Response, list[Lesson]]
     prior: Mapping[str, tuple[float, float]]
-    weights: FloatArray  # (shares, reaches)
+    weights: FloatArray  # (shares, shares of a family, reaches)
+    weights_of_paper: FloatArray
     spaces: Sequence[Space]
     wanted: Sequence[Response]
 
@@ -358,20 +368,21 @@ class Learnt:
         for regime, (mean, sd) in prior.items():
             squares = [(x.log - mean) ** 2 for r, own in by_response.items() if r[0] == regime for x in own]
             prior[regime] = mean, max(sd, math.sqrt(float(np.mean(squares)))) if squares else sd
-        total = np.zeros((len(SHARES), len(REACHES)))
+        of_paper = np.zeros((len(SHARES), len(SHARES_OF_FAMILY), len(REACHES)))
         shapes = [p for p in map(pattern_of, OWN_SHAPES) if p is not None]
         published = mixed(likenesses(shapes, shapes)) + LEAST_NOISE * np.eye(len(shapes))
         pressure = float(np.mean([target.pressure_Pa(w) for w in target.target]))
         for off in published_misses(pressure).values():
             y = np.array([off[s] for s in OWN_SHAPES])
-            total += log_likelihood(published * float(np.mean(y**2)), y)
+            of_paper += log_likelihood(published * float(np.mean(y**2)), y)
+        of_measured = np.zeros_like(of_paper)
         for r, own in by_response.items():
             # pressures of one regime are measured on the same specimens: together they count once
             alike = sum(other[0] == r[0] for other in by_response)
             y = np.array([x.log for x in own]) - prior[r[0]][0]
-            total += log_likelihood(covariance_of(own, prior[r[0]][1]), y) / alike
-        weights = np.exp(total - total.max())
-        return cls(by_response, prior, weights / weights.sum(), spaces, responses(target))
+            of_measured += log_likelihood(covariance_of(own, prior[r[0]][1]), y) / alike
+        weights = softmax(of_measured), softmax(of_measured + of_paper)
+        return cls(by_response, prior, *weights, spaces, responses(target))
 
     def missed(self, number: int, lengths: Sequence[Lengths]) -> dict[Response, tuple[FloatArray, FloatArray]]:
         """For designs of a family, ln(measured over predicted) of every response and its standard deviation."""
@@ -385,17 +396,15 @@ class Learnt:
             return np.full(len(patterns), mean), np.full(len(patterns), sd)
         y = np.array([x.log for x in own]) - mean
         between = sd**2 * mixed(likenesses(patterns, [x.pattern for x in own]))
-        solved = np.linalg.solve(covariance_of(own, sd), np.swapaxes(between, -1, -2))  # (shares, reaches, n, m)
+        solved = np.linalg.solve(covariance_of(own, sd), np.swapaxes(between, -1, -2))  # (..., n, m)
         means = y @ solved
         variances = np.maximum(sd**2 - np.einsum("...mn,...nm->...m", between, solved), 0.0)
-        weights = self.weights[:, :, None]
-        middle = (weights * means).sum((0, 1))
-        spread = (weights * (variances + means**2)).sum((0, 1)) - middle**2
-        return mean + middle, np.sqrt(np.maximum(spread, 0.0))
+        middle = np.tensordot(self.weights, means, 3)
+        return mean + middle, np.sqrt(np.tensordot(self.weights_of_paper, variances + (means - middle) ** 2, 3))
 
 
 def covariance_of(own: Sequence[Lesson], sd: float) -> FloatArray:
-    """Of what was measured of one response, by share and reach: what the model misses, and the uncertainty of each."""
+    """Of what was measured of one response, by shares and reach: what the model misses, and the uncertainty of each."""
     patterns = [x.pattern for x in own]
     noise = np.diag([max(x.u, LEAST_NOISE) ** 2 for x in own])
     return np.asarray(sd**2 * mixed(likenesses(patterns, patterns)) + noise)

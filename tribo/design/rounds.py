@@ -95,7 +95,7 @@ MESHES = {
 SPREAD_DEG = 10.0
 FINE_SEED = 100  # added to the seed for fine runs, of what was measured too: both meet the same random numbers
 CLOSE = 0.25  # tolerances; finer differences of a prediction are within the scatter of its runs (5 % and 1 to 2 %)
-MISS_OVER_DOUBT = 1e3  # a tenth of a tolerance beyond counts more than any standard deviation of ln(T/N)
+BEYOND = 100.0  # a tenth of a standard deviation beyond counts as much as e times the doubt
 Response = tuple[str, float, str]  # regime, pressure in Pa, direction
 Lengths = dict[str, float]
 Sds = Mapping[Response, FloatArray]  # standard deviations of ln(T/N)
@@ -189,19 +189,21 @@ def model_sd(want: Want, target: Target, sds: Sds) -> FloatArray:
 
 def cost_once_measured(target: Target, logs: dict[Response, FloatArray], sds: Sds) -> FloatArray:
     """What a search makes small once something was measured: of designs that are predicted within ``CLOSE`` of the
-    tolerance, the one of which the model is surest comes first; the others follow by their misses.
+    tolerance, the one of which the model is surest comes first; the others follow by their misses over that doubt.
 
     The chance to meet the target is no measure to go by: it prefers a design beside the measured one, which is sure to
-    miss by little, to the step that would meet.
+    miss by little, to the step that would meet. Where nothing is predicted close, it is the doubt that leaves a chance.
     """
     total = np.zeros(())
     for want in target.target:
         if want.best is not None:
             total = total + misses(want, target, logs)
             continue
+        tolerance = math.log1p(want.tolerance_percent / 100)
         close = CLOSE if target.goal(want) is not None else 0.0
-        beyond = np.maximum(misses(want, target, logs) - close, 0.0)
-        total = total + MISS_OVER_DOUBT * beyond**2 + model_sd(want, target, sds)
+        beyond = tolerance * np.maximum(misses(want, target, logs) - close, 0.0)
+        doubt = np.hypot(model_sd(want, target, sds), CLOSE * tolerance)
+        total = total + BEYOND * (beyond / doubt) ** 2 + np.log(doubt)
     return np.asarray(total)
 
 
