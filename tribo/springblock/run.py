@@ -10,6 +10,8 @@ from tribo.springblock.config import SimConfig
 from tribo.springblock.engines import ENGINES
 from tribo.springblock.engines.state import Trajectory, lattice_of, thresholds_of
 
+MOST_TIMES_LONGER = 4  # a force that rises without end is an error
+
 
 def simulate(config: SimConfig, threads: int = 1) -> Run:
     """Simulate one pull of one sample at one load; static and sliding friction follow from the slider force.
@@ -53,7 +55,14 @@ def simulate(config: SimConfig, threads: int = 1) -> Run:
                 allowed='a finer spacing, or cavity_shape "exact"',
             )
         )
-    trajectory = ENGINES[config.engine].integrate(config, lattice, thresholds_of(config, lattice), threads)
+    integrate, thresholds = ENGINES[config.engine].integrate, thresholds_of(config, lattice)
+    trajectory = integrate(config, lattice, thresholds, threads)
+    # the highest force of few blocks may come late, among the slips of sliding: such a run goes on
+    for _ in range(MOST_TIMES_LONGER):
+        if config.duration_s is not None or trajectory.time_s[-1] > config.window_start_peaks * trajectory.peak_s:
+            break
+        longer = config.with_(duration_s=config.duration_peaks * trajectory.peak_s)
+        trajectory = integrate(longer, lattice, thresholds, threads)
     return run_of(config, trajectory, float(lattice.area_fraction))
 
 
