@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
+import pandas as pd
 import pytest
 from blind.bench import Bench, Design
 from blind.direct import ingested
@@ -43,6 +44,14 @@ def specimen_drift(b: Bench, rng: np.random.Generator, in_common: float = 0.0) -
     rates = {name: in_common + rng.normal() for name in sorted(set(b.tests["specimen"]))}
     run = b.tests["specimen_run"] - b.tests.groupby("specimen")["specimen_run"].transform("mean")
     return of_one_size(run.to_numpy() * b.tests["specimen"].map(rates).to_numpy())
+
+
+def specimen_steps(b: Bench, rng: np.random.Generator) -> np.ndarray:
+    specimen, run = b.tests["specimen"], b.tests["specimen_run"]
+    steps = {name: rng.choice([-1.0, 1.0]) for name in sorted(set(specimen))}
+    late = run > run.groupby(specimen).transform("median")
+    change = (late * specimen.map(steps)).to_numpy()
+    return of_one_size(change - pd.Series(change).groupby(specimen.to_numpy()).transform("mean").to_numpy())
 
 
 specimen_drift_in_common = partial(specimen_drift, in_common=0.8)
@@ -113,6 +122,12 @@ def test_what_the_rates_of_all_specimens_have_in_common_counts_as_their_drift(mo
     (alone,) = inference.nuisance_layers(fitted, 0.01)
     assert told.low < 100 * SIZE < told.high
     assert alone.effect_percent < told.effect_percent < 100 * SIZE
+
+
+def test_the_interval_of_specimens_that_step_reaches_beyond_the_size_of_their_lines() -> None:
+    (told,) = inference.nuisance_layers(diagnosed(7, specimen_steps, small=True).baseline, 0.01)
+    assert told.name == "specimen_drift"
+    assert told.effect_percent < told.high * 3**0.5 / 2 < 100 * SIZE < told.high
 
 
 @pytest.mark.slow
