@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,32 @@ def test_once_something_was_measured_doubt_decides_among_designs_that_are_predic
     logs, sds = {STATIC: np.log([5.0, 5.05, 5.12])}, {STATIC: np.array([0.2, 0.1, 0.01])}
     sure, unsure, off = (1, 0, 2)
     assert list(np.argsort(cost_once_measured(TARGET, logs, sds))) == [sure, unsure, off]
+
+
+def test_where_no_design_is_predicted_close_the_one_that_the_model_knows_least_of_comes_first():
+    """A design that is sure to miss by 20 % has no chance; one that is predicted 24 % off, give or take 30 %, has."""
+    logs, sds = {STATIC: np.log([6.0, 6.2])}, {STATIC: np.array([0.03, 0.3])}
+    sure, unsure = cost_once_measured(TARGET, logs, sds)
+    assert unsure < sure
+
+
+def test_most_of_a_correction_is_carried_through_its_family():
+    """To lengths half and twice as large; to another family less."""
+    found = learnt(lesson(FIRST, -25.0))
+    (far,) = found.missed(0, [FAR])[STATIC][0]
+    (other,) = found.missed(1, [{"size_x_um": 12.0, "pitch_um": 20.0}])[STATIC][0]
+    assert far < 0.85 * math.log(0.75)
+    assert far < 1.2 * other
+
+
+def test_the_patterns_of_the_paper_widen_the_doubt_and_leave_the_correction():
+    """They differ more from each other than one measured pattern can show."""
+    found = learnt(lesson(FIRST, -25.0))
+    alone = replace(found, weights_of_paper=found.weights)
+    (mean,), (sd,) = found.missed(0, [FAR])[STATIC]
+    (mean_alone,), (sd_alone,) = alone.missed(0, [FAR])[STATIC]
+    assert mean == mean_alone
+    assert sd > 1.1 * sd_alone
 
 
 def test_of_designs_that_are_predicted_alike_the_one_near_the_measured_is_chosen():
