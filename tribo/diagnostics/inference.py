@@ -311,7 +311,7 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
 NUISANCES: dict[Nuisance, tuple[int, int]] = {
     "days": (SESSION, SESSION + 1), "drift": (DRIFT, DRIFT + 1), "specimen_drift": (SPECIMEN_DRIFT, SPECIMEN_DRIFT + 1),
 }  # fmt: skip
-MOST_BESIDE_LINES = 2.0 / 3**0.5  # a line through a step in the middle of a specimen has three quarters of its square
+MOST_OF_A_STEP = 2.0 / 3**0.5  # a line, with a bend or without, has three quarters of the square of a step half way
 CHAINS, SETTLING, KEPT = 40, 20, 40  # of draws of the random effects; steps of a chain, before it counts and after
 
 
@@ -321,8 +321,8 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
 
     The chance is that of a likelihood ratio with the sizes of both regimes free or held still. The interval is that of
     the random effects given the campaign, whatever the sizes of all of them are: days and drift take each other's place
-    in part, and a kind that is not beyond chance may still be there. Specimens are fitted by lines; where their course
-    bends or steps it is larger than that of the line, so the upper end for them is that of a step.
+    in part, and a kind that is not beyond chance may still be there. A specimen is fitted by a line with a bend, which
+    is smaller than a course that steps: the upper end for specimens is that of a step.
     """
     s, chances = f.setup, {}
     for name, groups in NUISANCES.items():
@@ -341,7 +341,7 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
         here = np.isin(wider.setup.group, NUISANCES[name])
         sizes = [_realised(wider.setup, np.where(here, part, 0.0)) for part in np.array_split(drawn, KEPT)]
         low, middle, high = 100.0 * np.quantile(np.concatenate(sizes), (0.05, 0.5, 0.95))
-        high *= MOST_BESIDE_LINES if name == "specimen_drift" else 1.0
+        high *= MOST_OF_A_STEP if name == "specimen_drift" else 1.0
         layers.append(
             Layer(
                 kind="nuisance", name=name, samples=(), regimes=tuple(REGIMES), p_adjusted=p,
