@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,25 @@ def test_a_curve_from_which_the_fit_gains_nothing_is_no_law(monkeypatch: pytest.
     chosen = search.choose_free
     monkeypatch.setattr(search, "choose_free", lambda *given: replace(chosen(*given), model=model))
     assert found() == ()
+
+
+@pytest.mark.parametrize(("of_a_curve", "first"), [(21.0, "curve"), (19.0, "formula")])
+def test_the_more_telling_of_formula_and_curve_is_told(
+    of_a_curve: float, first: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A formula of another column may follow a little of what a curve explains."""
+    tried: list[str] = []
+
+    def way(name: str) -> Any:
+        return lambda *given: tried.append(name)
+
+    monkeypatch.setattr(search, "_scored", lambda *given: [(WrittenLaw(()), 25.0, 20.0)])
+    monkeypatch.setattr(search, "_worth_counting", lambda *given: SimpleNamespace(measured=np.array([3.0, of_a_curve])))
+    monkeypatch.setattr(search, "_law_of_a_formula", way("formula"))
+    monkeypatch.setattr(search, "_law_of_no_formula", way("curve"))
+    search.discover_laws(campaign())
+    assert tried[0] == first
+    assert len(tried) == 2
 
 
 def adhesion_of_two_samples(s: Setup) -> np.ndarray:
