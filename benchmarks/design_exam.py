@@ -34,9 +34,8 @@ one of 400 a family, and a prediction is off by 1.2 %, a measurement by 2 %. In 
 misses differs from pattern to pattern as on those of the paper, a share of 0.3 in common and a reach of 1, with half
 of their size ("mild") or all of it ("as published"). It is counted for the constants as they are and for others.
 
-``--small`` takes few blocks and few runs (``loop``: few blocks), for short of time: it
-shows that the exam works, not what the search can do. Rows are written as they come; those that are there are not made
-again.
+``--small`` takes few blocks and few runs (``loop``: few blocks), for short of time: it shows that the exam works, not
+what the search can do. Rows are written as they come; those that are there are not made again.
 """
 
 from __future__ import annotations
@@ -312,6 +311,7 @@ def carried(count: int) -> None:
     """Worlds of each kind that are met within three campaigns, with one constant after the other at another value."""
     spaces = [Space(family, k) for k, family in enumerate(FAMILIES)]
     every = [(k, lengths) for k, space in enumerate(spaces) for lengths in space.candidates(400, SEED)]
+    families = [[n for n, (j, _) in enumerate(every) if j == k] for k in range(len(spaces))]
     patterns = [spaces[k].pattern(lengths) for k, lengths in every]
     family, places = zip(*map(place_of, patterns), strict=True)
     same = np.array([[a == b for a in family] for b in family], float)
@@ -348,15 +348,14 @@ def carried(count: int) -> None:
             learnt = answer.Learnt.of(lessons, answer.model_errors(target, None), target, spaces)
             aim = Aim(target, spaces, learnt.missed, bool(lessons))
             costs = np.concatenate([
-                aim.costs(k, [lengths for j, lengths in every if j == k],
-                          {r: logs[p][r[0]][[j == k for j, _ in every]] for r in responses(target)})
-                for k in range(len(spaces))
+                aim.costs(k, [every[n][1] for n in own], {r: logs[p][r[0]][own] for r in responses(target)})
+                for k, own in enumerate(families)
             ])  # fmt: skip
             costs[[n for _, n, _ in seen]] = np.inf
             n = int(np.argmin(costs))
             measured = {f: float(truth[f][n] + rng.normal(0.0, 0.02)) for f in regimes}
-            for r, (mean, sd) in learnt.missed(every[n][0], [every[n][1]]).items():
-                if lessons:
+            if lessons:
+                for r, (mean, sd) in learnt.missed(every[n][0], [every[n][1]]).items():
                     held.append(bool(abs(off[r[0]][n] - mean[0]) <= answer.NINETY * math.hypot(sd[0], 0.02)))
             for f in regimes:
                 predicted = math.exp(logs[p][f][n] + rng.normal(0.0, 0.012))
@@ -466,8 +465,11 @@ def main() -> None:
     if given.cell == "table":
         table(given.path)
         return
-    if given.cell in ("reach", "carried"):
-        reach() if given.cell == "reach" else carried(given.count)
+    if given.cell == "reach":
+        reach()
+        return
+    if given.cell == "carried":
+        carried(given.count)
         return
     if given.small:
         for name, value in (SMALL_LOOP if given.cell == "loop" else SMALL).items():

@@ -311,7 +311,7 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
 NUISANCES: dict[Nuisance, tuple[int, int]] = {
     "days": (SESSION, SESSION + 1), "drift": (DRIFT, DRIFT + 1), "specimen_drift": (SPECIMEN_DRIFT, SPECIMEN_DRIFT + 1),
 }  # fmt: skip
-MOST_OF_A_STEP = 2.0 / 3**0.5  # a line, with a bend or without, has three quarters of the square of a step half way
+STEP_OVER_LINE = 2.0 / 3**0.5  # a line has three quarters of the square of a step half way, with a bend or without
 CHAINS, SETTLING, KEPT = 40, 20, 40  # of draws of the random effects; steps of a chain, before it counts and after
 
 
@@ -341,7 +341,7 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
         here = np.isin(wider.setup.group, NUISANCES[name])
         sizes = [_realised(wider.setup, np.where(here, part, 0.0)) for part in np.array_split(drawn, KEPT)]
         low, middle, high = 100.0 * np.quantile(np.concatenate(sizes), (0.05, 0.5, 0.95))
-        high *= MOST_OF_A_STEP if name == "specimen_drift" else 1.0
+        high *= STEP_OVER_LINE if name == "specimen_drift" else 1.0
         layers.append(
             Layer(
                 kind="nuisance", name=name, samples=(), regimes=tuple(REGIMES), p_adjusted=p,
