@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tribo.mechanisms_in_model import simulate_with
 from tribo.records import FloatArray, Pattern
 from tribo.springblock import SimConfig, simulate
 from tribo.springblock.calibration import expected_minimum
@@ -130,12 +131,17 @@ def test_equal_seeds_give_equal_bits():
     assert first.sliding_friction == second.sliding_friction
 
 
-def test_a_run_whose_highest_force_comes_late_goes_on_until_its_window_ends() -> None:
-    # few blocks in contact: one slip of sliding friction rises above the first peak after three of its times
+def late_highest_force() -> SimConfig:
+    """Few blocks in contact: one slip of sliding friction rises above the first peak after three of its times."""
     pattern = Pattern("P", "circle", (21.5e-6, 21.5e-6), (24.5e-6, 24.5e-6 * 3**0.5 / 2), True, lattice="hexagonal")
-    run = simulate(SimConfig(
+    return SimConfig(
         sample="P", pattern=pattern, pressure_Pa=25e3, angle_deg=67.5, seed=2389512395, blocks=(15, 13),
         thickness_m=5e-6, cavity_shape="exact", dt_s=1e-7, duration_peaks=2.0, rest_tolerance=1e-2,
-    ))  # fmt: skip
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("acting", [{}, {"edge_adhesion": [1e-9, 1.0]}], ids=["alone", "with a mechanism on blocks"])
+def test_a_run_whose_highest_force_comes_late_goes_on_until_its_window_ends(acting: dict[str, list[float]]) -> None:
+    run = simulate_with(late_highest_force(), {name: np.array(values) for name, values in acting.items()})
     assert run.window_s[1] == pytest.approx(2.0 * run.peak_s, rel=1e-4)
     assert run.force_N.max() == pytest.approx(run.static_friction * run.normal_load_N, rel=1e-3)

@@ -57,13 +57,24 @@ def simulate(config: SimConfig, threads: int = 1) -> Run:
         )
     integrate, thresholds = ENGINES[config.engine].integrate, thresholds_of(config, lattice)
     trajectory = integrate(config, lattice, thresholds, threads)
-    # the highest force of few blocks may come late, among the slips of sliding: such a run goes on
     for _ in range(MOST_TIMES_LONGER):
-        if config.duration_s is not None or trajectory.time_s[-1] > config.window_start_peaks * trajectory.peak_s:
-            break
-        longer = config.with_(duration_s=config.duration_peaks * trajectory.peak_s)
-        trajectory = integrate(longer, lattice, thresholds, threads)
+        if ends_too_early(config, trajectory):
+            trajectory = integrate(longer(config, trajectory), lattice, thresholds, threads)
     return run_of(config, trajectory, float(lattice.area_fraction))
+
+
+def ends_too_early(config: SimConfig, trajectory: Trajectory) -> bool:
+    """Whether the highest force came so late that the sliding window begins after the end.
+
+    That of few blocks may come among the slips of sliding. A run whose length is given does not go on.
+    """
+    too_late = trajectory.time_s[-1] <= config.window_start_peaks * trajectory.peak_s
+    return bool(config.duration_s is None and too_late)
+
+
+def longer(config: SimConfig, trajectory: Trajectory) -> SimConfig:
+    """A run that lasts as many peak times as asked for, of the peak that a run before it has found."""
+    return config.with_(duration_s=config.duration_peaks * trajectory.peak_s)
 
 
 def run_of(config: SimConfig, trajectory: Trajectory, area_fraction: float) -> Run:
