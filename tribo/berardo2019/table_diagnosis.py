@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import logsumexp
 
 from tribo.berardo2019.table_model import (
     RANGE_PA,
@@ -309,8 +310,7 @@ def _ratio_percent(result: TableReading, sample: str, observable: str) -> tuple[
 
 
 def _cause(w: TableFit, main: TableReading) -> Cause:
-    gains = np.array([n.gain for n in main.near])
-    share = float(np.exp(w.gain - gains.max()) / np.exp(gains - gains.max()).sum())
+    share = float(np.exp(w.gain - logsumexp([n.gain for n in main.near])))
     return Cause(w.name, share, estimate_of(w))
 
 

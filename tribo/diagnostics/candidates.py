@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import softmax
 
 from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.fit import ModelFit, fit
@@ -186,8 +187,7 @@ def weights_of(candidates: Sequence[CauseCandidate]) -> FloatArray:
     """
     gains = np.array([c.gain for c in candidates])
     unit = max(1.0, TIED[1] * gains.max() / CLOSE)
-    share = np.exp((gains - gains.max()) / unit)
-    return np.asarray(share / share.sum())
+    return np.asarray(softmax(gains / unit))
 
 
 @displayed()

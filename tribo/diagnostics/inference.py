@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
+from scipy.special import gammaln, softmax
 from scipy.stats import chi2, norm
 
 from tribo.diagnostics.effect_sizes import NORMAL_90, RECORDED, rms_percent
@@ -81,8 +81,7 @@ def with_open_form(f: ModelFit, index: int) -> dict[str, Estimate]:
     """
     fits = [f] + [_with_form(f, index, share) for share in FORM_SHARES]
     log_weight = np.array([g.score + _log_freedom(g) for g in fits])
-    weight = np.exp(log_weight - log_weight.max())
-    weight = weight / weight.sum()
+    weight = softmax(log_weight)
     values = np.array([g.values[index] for g in fits])
     variances = np.array([standard_errors(g, index) for g in fits]) ** 2
     middle = weight @ values
@@ -132,8 +131,7 @@ def over_pattern_error(f: ModelFit) -> tuple[FloatArray, list[ModelFit]]:
     log_weight = np.array([g.score + _log_freedom(g) for g in fits])
     for group in OF_PATTERNS:
         log_weight += log_size_prior(group, f.noise.sizes[group] * np.exp(PATTERN_STEPS))
-    weight = np.exp(log_weight - log_weight.max())
-    return weight / weight.sum(), fits
+    return softmax(log_weight), fits
 
 
 def _log_freedom(f: ModelFit) -> float:

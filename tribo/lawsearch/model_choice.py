@@ -13,6 +13,7 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from scipy.special import logsumexp, softmax
 from scipy.stats import chi2
 
 from tribo.diagnostics.candidates import PER_PARAMETER, refitted
@@ -163,8 +164,7 @@ class Form:
     @property
     def weight(self) -> FloatArray:
         """Of each shape within the form, adding to one."""
-        weight = np.exp(self.gains - self.gains.max())
-        return np.asarray(weight / weight.sum())
+        return np.asarray(softmax(self.gains))
 
 
 def choose_form(model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, rng: np.random.Generator) -> FoundLaw:
@@ -350,7 +350,7 @@ def _change_of_any_form(at: Background, curve: FreeCurve, without: Collection[st
         surfaces = [_surface(scope, each, left) for each, e in zip(pairs, beside, strict=True) if e > alone - IN_REACH]
         curves += surfaces
         evidence += [each.evidence - np.log(len(pairs)) for each in surfaces]
-    share = np.exp(np.array(evidence) - max(evidence))
+    share = softmax(evidence)
     changes = []
     for each in curves:
         columns = [centred(one, at.conditions, at.terms[LOAD_TERM]) for one in np.moveaxis(each.columns, 2, 0)]
@@ -543,7 +543,7 @@ def _on_fine_grid(
     grid = fine_products(shapes) if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
     courses = Courses([(s, 0.0) for s in grid], c)
     gains = projected.gains(courses, acts)[0, 0]
-    mean = float(gains.max() + np.log(np.mean(np.exp(gains - gains.max()))))
+    mean = float(logsumexp(gains) - np.log(len(gains)))
     further = sum((s.kind in PLACED) + (s.kind in WIDE) + (s.kind == "wave") for s in courses.shapes[0])
     evidence = mean - costs[0] - costs[1] - PER_PARAMETER * further
     finer = refined_shapes(courses.shapes[int(gains.argmax())][0], c) if len(shapes) == 1 else []
