@@ -112,9 +112,10 @@ def truth(target: Target, pattern: Pattern, seed: int, halved: bool) -> list[flo
 
 
 def runs_of(target: Target) -> int:
-    """Runs of a search of one family."""
+    """Runs of a search."""
     points = len({r[1:] for r in responses(target)})
-    coarse = (len(target.pattern) * rounds.FIRST + rounds.ROUNDS * rounds.BATCH) * rounds.COARSE_RUNS
+    first = sum(rounds.first_designs(Space(family, k)) for k, family in enumerate(target.pattern))
+    coarse = (first + rounds.ROUNDS * rounds.BATCH) * rounds.COARSE_RUNS
     return points * (coarse + rounds.FINAL * rounds.FINE_RUNS + 4)
 
 

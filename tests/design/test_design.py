@@ -18,8 +18,8 @@ from tribo.campaign.geometry import Making, faults_of_making
 from tribo.cli import main
 from tribo.design import answer_files, rounds
 from tribo.design.answer_files import polygons_um, repeat_um
-from tribo.design.rounds import fitted, in_whole_periods, on_mesh
-from tribo.design.target import Family, Space, read_target
+from tribo.design.rounds import Aim, Rounds, Tried, fitted, in_whole_periods, on_mesh
+from tribo.design.target import Family, Space, Target, Want, read_target
 from tribo.errors import SimulationError
 from tribo.records import Pattern
 from tribo.springblock import SimConfig
@@ -87,6 +87,31 @@ def test_designs_meet_the_target_can_be_made_and_come_with_their_campaign(tmp_pa
     pattern = PatternTable.model_validate(described).pattern("P")
     assert pattern.area_fraction == pytest.approx(answers[0]["area_fraction"])
     assert not list(faults_of_making(pattern, Making(4e-6, 3e-6, 0.5e-6)))
+
+
+RECTANGLES = Family(cavity="rectangle", size_x_um=[20, 60], size_y_um=[8, 20], pitch_x_um=[70, 90], pitch_y_um=[30, 40])
+SQUARES = Family(cavity="square", size_x_um=[6, 24], pitch_um=[30, 40])
+
+
+@pytest.mark.parametrize(("family", "first", "mesh"), [(SQUARES, 14, "coarse"), (RECTANGLES, 102, "fine")])
+def test_the_more_lengths_are_free_the_more_designs_are_run_and_the_finer(
+    family: Family, first: int, mesh: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made: list[tuple[str, int, float]] = []
+    wanted, rng = ("static", 1e4, "all"), np.random.default_rng(1)
+
+    def run(_: object, name: str, chosen: list[tuple[int, dict]], base: SimConfig, *given: object) -> list[Tried]:
+        made.append((name, len(chosen), base.spacing_m))
+        return [Tried(*design, {wanted: float(rng.normal())}, {wanted: 0.01}) for design in chosen]
+
+    monkeypatch.setattr(rounds, "tried", run)
+    target = Target(target=[Want(friction="static", pressure_kPa=10, best="smallest")], pattern=[family])
+    spaces = [Space(family, 0)]
+    aim = Aim(target, spaces, lambda _, lengths: {wanted: (np.zeros(len(lengths)), np.zeros(len(lengths)))})
+    rounds.search(Rounds(spaces, [wanted], tmp_path, 1, 1), aim, SimConfig(cavity_shape="exact"), lambda *said: None)
+    spacing = rounds.MESHES[mesh][1]
+    assert made[0] == ("first", first, spacing)
+    assert {spaced for name, _, spaced in made if name.startswith("round")} == {spacing}
 
 
 @pytest.mark.parametrize("cavity", ["square", "circle", "ridge"])

@@ -85,6 +85,8 @@ def fitted(x: FloatArray, y: FloatArray, noise: float) -> Surrogate:
 
 COARSE_RUNS, FINE_RUNS = 2, 4
 FIRST, ROUNDS, BATCH, FINAL = 14, 3, 5, 6
+FEW = 2  # free lengths of a family, along which friction is smooth enough for few designs and coarse runs
+FURTHER = 2.7  # times as many first designs for every length beyond these: what runs tell of 38 designs, of 100
 CANDIDATES = 2048
 APART = 0.05  # of the span of a length or of the area fraction, between two designs of a round
 # blocks a side, their spacing in m, time step in s: of the search, of its answers, and of the mesh error on one patch
@@ -356,10 +358,18 @@ def on_mesh(base: SimConfig, name: str) -> SimConfig:
     return base.with_(blocks=(n, n), spacing_m=spacing, thickness_m=base.layer_m, dt_s=dt, rest_tolerance=1e-2)
 
 
+def first_designs(space: Space) -> int:
+    """How many designs of a family are run before a surrogate chooses."""
+    return round(FIRST * FURTHER ** max(len(space.free) - FEW, 0))
+
+
 def search(
     all_rounds: Rounds, aim: Aim, base: SimConfig, say: Say
 ) -> tuple[list[Tried], list[Tried], list[Tried], Surrogates]:
     """Coarse runs over each family, rounds of more where the surrogate expects the target, then fine ones.
+
+    Families of many lengths have fine runs from the start, as coarse ones order their designs poorly
+    (docs/results/design.md).
 
     Returns all coarse designs, the fine ones, best first, the best one on the patch of the fine mesh and of half of
     it, and the surrogates.
@@ -367,8 +377,10 @@ def search(
     spaces, wanted, seed = all_rounds.spaces, all_rounds.wanted, all_rounds.seed
     coarse, fine, patch, halved = (on_mesh(base, name) for name in MESHES)
     points = len({r[1:] for r in wanted})
-    steps = (len(spaces) * FIRST + ROUNDS * BATCH) * COARSE_RUNS * points
-    total, done = steps + 2 * FINAL * FINE_RUNS * points * 12, 0  # a fine run takes about twelve coarse ones
+    many = any(len(space.free) > FEW for space in spaces)
+    searched, weight = (fine, 12) if many else (coarse, 1)  # a fine run takes about twelve coarse ones
+    steps = (sum(first_designs(space) for space in spaces) + ROUNDS * BATCH) * COARSE_RUNS * points * weight
+    total, done = steps + 2 * FINAL * FINE_RUNS * points * 12, 0
 
     def made(
         name: str, chosen: Sequence[tuple[int, Lengths]], config: SimConfig, runs: int, own: int, weight: int
@@ -382,12 +394,12 @@ def search(
         done += len(chosen) * runs * points * weight
         return found
 
-    first = [(k, lengths) for k, space in enumerate(spaces) for lengths in space.candidates(FIRST, seed)]
-    known = made("first", first, coarse, COARSE_RUNS, seed, 1)
+    first = [(k, lengths) for k, space in enumerate(spaces) for lengths in space.candidates(first_designs(space), seed)]
+    known = made("first", first, searched, COARSE_RUNS, seed, weight)
     for turn in range(ROUNDS):
         batch = promising(aim, known, surrogates_of(spaces, known), {}, BATCH, seed + 1 + turn)
         if batch:
-            known += made(f"round-{turn + 1}", batch, coarse, COARSE_RUNS, seed, 1)
+            known += made(f"round-{turn + 1}", batch, searched, COARSE_RUNS, seed, weight)
     surrogates = surrogates_of(spaces, known)
     best = sorted(known, key=aim.cost_of)[: FINAL // 2]
     chosen = [(t.space, t.lengths_um) for t in best]
