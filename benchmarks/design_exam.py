@@ -115,7 +115,9 @@ def runs_of(target: Target) -> int:
     """Runs of a search."""
     points = len({r[1:] for r in responses(target)})
     first = sum(rounds.first_designs(Space(family, k)) for k, family in enumerate(target.pattern))
-    coarse = (first + rounds.ROUNDS * rounds.BATCH) * rounds.COARSE_RUNS
+    many = any(len(Space(family, k).free) > rounds.FEW for k, family in enumerate(target.pattern))
+    further = rounds.ROUNDS_OF_MANY * rounds.BATCH_OF_MANY if many else rounds.ROUNDS * rounds.BATCH
+    coarse = (first + further) * rounds.COARSE_RUNS
     return points * (coarse + rounds.FINAL * rounds.FINE_RUNS + 4)
 
 

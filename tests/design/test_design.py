@@ -93,9 +93,11 @@ RECTANGLES = Family(cavity="rectangle", size_x_um=[20, 60], size_y_um=[8, 20], p
 SQUARES = Family(cavity="square", size_x_um=[6, 24], pitch_um=[30, 40])
 
 
-@pytest.mark.parametrize(("family", "first", "mesh"), [(SQUARES, 14, "coarse"), (RECTANGLES, 102, "fine")])
+@pytest.mark.parametrize(
+    ("family", "first", "designs_of_rounds", "mesh"), [(SQUARES, 14, 15, "coarse"), (RECTANGLES, 102, 48, "fine")]
+)
 def test_the_more_lengths_are_free_the_more_designs_are_run_and_the_finer(
-    family: Family, first: int, mesh: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    family: Family, first: int, designs_of_rounds: int, mesh: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     made: list[tuple[str, int, float]] = []
     wanted, rng = ("static", 1e4, "all"), np.random.default_rng(1)
@@ -111,7 +113,20 @@ def test_the_more_lengths_are_free_the_more_designs_are_run_and_the_finer(
     rounds.search(Rounds(spaces, [wanted], tmp_path, 1, 1), aim, SimConfig(cavity_shape="exact"), lambda *said: None)
     spacing = rounds.MESHES[mesh][1]
     assert made[0] == ("first", first, spacing)
-    assert {spaced for name, _, spaced in made if name.startswith("round")} == {spacing}
+    in_rounds = [each for each in made if each[0].startswith("round")]
+    assert {spaced for _, _, spaced in in_rounds} == {spacing}
+    assert sum(number for _, number, _ in in_rounds) == designs_of_rounds
+
+
+def test_designs_beside_another_one_are_near_it_in_every_length_and_can_be_made() -> None:
+    space = Space(RECTANGLES, 0)
+    middle = {"size_x_um": 58.0, "size_y_um": 12.0, "pitch_x_um": 80.0, "pitch_y_um": 35.0}
+    near = space.candidates_near(middle, 40, 1)
+    assert len(near) > 10
+    for name, (low, high) in space.free.items():
+        off = [abs(lengths[name] - middle[name]) for lengths in near]
+        assert max(off) <= 0.1 * (high - low) + 0.25  # half a step of the mask
+    assert not any(space.fault(lengths) for lengths in near)
 
 
 @pytest.mark.parametrize("cavity", ["square", "circle", "ridge"])

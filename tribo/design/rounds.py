@@ -86,7 +86,8 @@ def fitted(x: FloatArray, y: FloatArray, noise: float) -> Surrogate:
 COARSE_RUNS, FINE_RUNS = 2, 4
 FIRST, ROUNDS, BATCH, FINAL = 14, 3, 5, 6
 FEW = 2  # free lengths of a family, along which friction is smooth enough for few designs and coarse runs
-FURTHER = 2.7  # times as many first designs for every length beyond these: what runs tell of 38 designs, of 100
+FURTHER = 2.7  # times as many first designs for every length beyond these: 38 and 100
+ROUNDS_OF_MANY, BATCH_OF_MANY, CLIMBED, BESIDE = 6, 8, 3, 128  # of many lengths: also designs beside the best few
 CANDIDATES = 2048
 APART = 0.05  # of the span of a length or of the area fraction, between two designs of a round
 # blocks a side, their spacing in m, time step in s: of the search, of its answers, and of the mesh error on one patch
@@ -335,6 +336,9 @@ def promising(
         candidates = space.candidates(CANDIDATES, seed)
         if not candidates or number not in surrogates:
             continue
+        if len(space.free) > FEW:
+            best = sorted((t for t in known if t.space == number), key=aim.cost_of)[:CLIMBED]
+            candidates += [each for t in best for each in space.candidates_near(t.lengths_um, BESIDE, seed)]
         x = np.array([space.at(lengths) for lengths in candidates])
         logs = {r: s(x) + shift.get(r, 0.0) for r, s in surrogates[number].items()}
         costs = aim.costs(number, candidates, logs).tolist()
@@ -379,7 +383,8 @@ def search(
     points = len({r[1:] for r in wanted})
     many = any(len(space.free) > FEW for space in spaces)
     searched, weight = (fine, 12) if many else (coarse, 1)  # a fine run takes about twelve coarse ones
-    steps = (sum(first_designs(space) for space in spaces) + ROUNDS * BATCH) * COARSE_RUNS * points * weight
+    turns, batch_size = (ROUNDS_OF_MANY, BATCH_OF_MANY) if many else (ROUNDS, BATCH)
+    steps = (sum(first_designs(space) for space in spaces) + turns * batch_size) * COARSE_RUNS * points * weight
     total, done = steps + 2 * FINAL * FINE_RUNS * points * 12, 0
 
     def made(
@@ -396,8 +401,8 @@ def search(
 
     first = [(k, lengths) for k, space in enumerate(spaces) for lengths in space.candidates(first_designs(space), seed)]
     known = made("first", first, searched, COARSE_RUNS, seed, weight)
-    for turn in range(ROUNDS):
-        batch = promising(aim, known, surrogates_of(spaces, known), {}, BATCH, seed + 1 + turn)
+    for turn in range(turns):
+        batch = promising(aim, known, surrogates_of(spaces, known), {}, batch_size, seed + 1 + turn)
         if batch:
             known += made(f"round-{turn + 1}", batch, searched, COARSE_RUNS, seed, weight)
     surrogates = surrogates_of(spaces, known)

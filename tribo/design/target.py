@@ -211,6 +211,7 @@ def corrections_of_report(folder: Path, flat: str) -> dict[str, tuple[float, flo
 
 
 _UM = 1e-6
+NEAR = 0.1  # of the span of every length: how far a search looks beside a good design
 
 
 @dataclass(frozen=True)
@@ -265,10 +266,20 @@ class Space:
 
     def candidates(self, n: int, seed: int) -> list[dict[str, float]]:
         """Up to n different patterns that can be made, spread evenly."""
+        return self.candidates_between(np.zeros(len(self.free)), np.ones(len(self.free)), n, seed)
+
+    def candidates_near(self, lengths_um: dict[str, float], n: int, seed: int) -> list[dict[str, float]]:
+        """The same, every length within NEAR of its span from those of a pattern."""
+        middle = self.at(lengths_um)[:-1]
+        return self.candidates_between(np.maximum(middle - NEAR, 0.0), np.minimum(middle + NEAR, 1.0), n, seed)
+
+    def candidates_between(self, low: FloatArray, high: FloatArray, n: int, seed: int) -> list[dict[str, float]]:
+        """The same between two corners of the cube of the lengths."""
         if not self.free:
             fixed = self.lengths_um(np.zeros(0))
             return [] if self.fault(fixed) else [fixed]
         points = qmc.Sobol(len(self.free), seed=seed).random_base2(max(3, math.ceil(math.log2(2 * n))))
+        points = low + (high - low) * points
         found: dict[tuple[float, ...], dict[str, float]] = {}
         for x in points:
             lengths = self.lengths_um(x)
