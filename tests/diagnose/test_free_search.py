@@ -15,7 +15,8 @@ from tribo.diagnostics.contrasts import share_beyond
 from tribo.diagnostics.fit import ModelFit, whitened
 from tribo.diagnostics.model import Setup, log_forces
 from tribo.diagnostics.replicates import drawn_residuals, standardised
-from tribo.lawsearch import free_search, model_choice, search
+from tribo.lawsearch import free_curves, free_search, model_choice, search
+from tribo.lawsearch.free_curves import fitted_curve, knots_of, likeliest_products
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes, likeliest, without_outliers
 from tribo.lawsearch.grammar import ADHESION_TERM, ALL, BOTH, T, WrittenLaw
 from tribo.lawsearch.model_choice import CLOSE, Background, Form, FoundLaw
@@ -48,6 +49,7 @@ def searched(model: ModelFit, columns: list[tuple[str, ...]]) -> FreeSearch:
 def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_search, "NOISES", np.ones(1))
     monkeypatch.setattr(free_search, "SIZES", np.full(1, SIZE))
+    monkeypatch.setattr(free_search, "PRODUCTS", 0)
     model, pair = campaign(1), ("temperature_C", "humidity_pct")
     search = searched(model, [pair])
     n = model.setup.observations.n
@@ -74,9 +76,69 @@ def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypa
             within = np.eye(course.shape[1]) + course.T @ rest @ course
             pull = course.T @ rest @ z
             likely.append(0.5 * (pull @ np.linalg.solve(within, pull) / noise - np.linalg.slogdet(within)[1]))
-        expected = np.log(np.mean(np.exp(likely)))  # short lengths and long ones
+        # short lengths and long ones, half of it: the other half is that of products, which say nothing here
+        expected = np.log(0.5 * np.mean(np.exp(likely)))
         found = search.measured[0, g] + search.cost[0, g]
         assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_evidence_of_a_product_of_two_curves_is_its_marginal_likelihood_over_none() -> None:
+    """Laplace's approximation, of the likelier half: the same product with both signs turned is as likely."""
+    rng, size = np.random.default_rng(1), 0.5
+    courses = rng.normal(size=(200, 4))
+    measured = courses @ np.outer([1.0, 0.4], [0.6, -0.8]).ravel() + rng.normal(size=200)
+    information, pull = (courses.T @ courses).reshape(2, 2, 2, 2), (courses.T @ measured).reshape(2, 2)
+    (found,) = likeliest_products(information, pull, np.array([size])).evidence
+    drawn = rng.normal(size=(2, 1_000_000, 2))
+    products = size * (drawn[0][:, :, None] * drawn[1][:, None]).reshape(-1, 4)
+    likely = products @ pull.ravel() - 0.5 * np.sum((products @ (courses.T @ courses)) * products, axis=1)
+    expected = np.logaddexp.reduce(likely) - np.log(len(likely))
+    assert expected > 40.0
+    assert found + np.log(2.0) == pytest.approx(expected, abs=0.25)
+
+
+def product_of_two_curves(s: Setup) -> np.ndarray:
+    """A wave and a half of the temperature times one of the humidity."""
+    c = s.observations.conditions
+    along = [np.sin(3.0 * np.pi * (x - x.min()) / np.ptp(x) + 0.5) for x in (c.temperature_C, c.humidity_pct)]
+    return 0.1 * (along[0] * along[1])[:, None] * np.ones(2)
+
+
+@cache
+def with_product() -> tuple[ModelFit, WrittenLaw]:
+    """A campaign with a product of two curves, and the surface on all samples that has it."""
+    model = baseline(made(product_of_two_curves, seed=5, design=Design(samples=("F", "A", "B", "Sx"), repeats=2)))
+    c = model.setup.observations.conditions
+    shapes = tuple(shape for name in ("temperature_C", "humidity_pct") if (shape := knots_of(name, c)) is not None)
+    return model, WrittenLaw(shapes)
+
+
+def test_a_product_of_two_curves_is_likelier_than_a_surface_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, _ = with_product()
+    ((evidence, *_),) = likeliest(searched(model, [("temperature_C", "humidity_pct")]), 2)
+    monkeypatch.setattr(free_search, "PRODUCTS", 0)
+    ((of_surface, *_),) = likeliest(searched(model, [("temperature_C", "humidity_pct")]), 2)
+    assert evidence > of_surface + CLOSE
+
+
+def test_a_surface_that_is_a_product_lies_nearer_to_it_than_one_of_any_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, law = with_product()
+    effects = np.ones((model.setup.observations.n, 2))
+    hidden = product_of_two_curves(model.setup)[:, 0]
+
+    def off() -> float:
+        curve = fitted_curve(model, (law, effects), 1.0)
+        told = curve.columns[:, 0] @ curve.heights
+        return float(np.sqrt(np.mean((told - hidden + hidden.mean() - told.mean()) ** 2)))
+
+    with_products = off()
+    of_products = free_curves._members_of_products
+
+    def unlikely(*given: Any) -> list[Any]:
+        return [replace(m, evidence=m.evidence - 100.0) for m in of_products(*given)]
+
+    monkeypatch.setattr(free_curves, "_members_of_products", unlikely)
+    assert with_products < 0.8 * off()
 
 
 def test_a_law_of_one_sample_is_judged_at_the_noise_that_it_leaves_there() -> None:

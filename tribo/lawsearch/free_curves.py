@@ -3,17 +3,20 @@ with its band.
 
 A curve is held at knots along the column. It is uncertain by what the campaign leaves open, averaged over how large,
 how smooth and how fast it may be (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and
-5). The band of a formula is that of the curve of its column: the formula was chosen among many once the data had been
-seen, the curve was not.
+5). A surface may be a product of two curves; what a campaign says for that follows from Laplace's approximation
+(Tierney and Kadane, J. Am. Stat. Assoc. 81, 82, 1986). The band of a formula is that of the curve of its column: the
+formula was chosen among many once the data had been seen, the curve was not.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
+from scipy.special import logsumexp, softmax
 
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.gaps import enough_recorded
@@ -35,6 +38,7 @@ KNOTS = 25
 ALONG = 13  # knots of a surface along each column
 LENGTHS = (0.07, 0.15, 0.3, 0.6)  # over which a curve changes, in shares of the range of the column
 SIZES = np.geomspace(0.005, 0.5, 9)  # standard deviation of a curve, in ln T
+STARTS, TURNS, TINY = 2, 8, 1e-9  # of the fit of a product of two curves: from where, how often each, a length above 0
 FLAT_BELOW = 1e-7  # of the largest variance of a curve along its principal directions, below which one is left out
 FOLDS = 5  # of whole specimens that are left out
 AS_GOOD = 1.0  # standard errors by which tests left out may favour a curve over the formula that stays
@@ -110,11 +114,15 @@ def at_knots(shapes: Sequence[Shape], c: Conditions) -> FloatArray:
 
 def likely(shapes: Sequence[Shape]) -> list[FloatArray]:
     """Covariances between the knots of a curve or a surface, of a standard deviation of one along each column."""
-    each = [kernels(shape) for shape in shapes]
-    if len(each) == 1:
-        return each[0]
-    alike = (pair for k in (0, 1) for pair in product(each[0][2 + k :: 2], each[1][2 + k :: 2]))
-    return [np.asarray(np.kron(1.0 + one, 1.0 + other) - 1.0, float) for one, other in alike]
+    if len(shapes) == 1:
+        return kernels(shapes[0])
+    return [np.asarray(np.kron(1.0 + one, 1.0 + other) - 1.0, float) for one, other in _both_kernels(shapes)]
+
+
+def _both_kernels(shapes: Sequence[Shape]) -> list[tuple[FloatArray, FloatArray]]:
+    """Of a surface, the covariances along each column, both smooth or both rough, of each two lengths."""
+    one, other = (kernels(shape) for shape in shapes)
+    return [pair for k in (0, 1) for pair in product(one[2 + k :: 2], other[2 + k :: 2])]
 
 
 def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], informed: float) -> FreeCurve:
@@ -140,36 +148,144 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
     information, pull = rows.T @ rows, rows.T @ residual
     found = []
     for kernel in likely(law.shapes):
-        variance, directions = np.linalg.eigh(kernel)
-        kept = variance > FLAT_BELOW * variance[-1]
-        root = directions[:, kept] * np.sqrt(variance[kept])
+        root = _root(kernel)
         sizes = SIZES if len(law.shapes) == 1 else SIZES[2::2]
         found += [_member(information, pull, size * root, informed) for size in sizes]
-    evidence = np.array([member[0] for member in found])
-    share = np.exp(evidence - evidence.max())
-    share = share / share.sum()
-    heights = np.sum([w * member[1] for w, member in zip(share, found, strict=True)], axis=0)
-    covariance = sum(
-        w * (own + np.outer(value - heights, value - heights))
-        for w, (_, value, own, _) in zip(share, found, strict=True)
-    )
-    prior = sum(w * member[3] @ member[3].T for w, member in zip(share, found, strict=True))
-    variance, directions = np.linalg.eigh(prior)
+    span = np.average([m.root @ m.root.T for m in found], axis=0, weights=softmax([m.evidence for m in found]))
+    evidence = _mean_evidence(found)
+    if len(law.shapes) > 1:
+        products = _members_of_products(law.shapes, information, pull, informed)
+        even = np.log(len(found)) - np.log(len(products))  # products of curves together count as much as surfaces
+        evidence = float(np.logaddexp(evidence, _mean_evidence(products)) - np.log(2.0))
+        found += [replace(m, evidence=m.evidence + even) for m in products]
+    share = softmax([m.evidence for m in found])
+    heights = np.average([m.heights for m in found], axis=0, weights=share)
+    spread = [m.covariance + np.outer(m.heights - heights, m.heights - heights) for m in found]
+    covariance = np.average(spread, axis=0, weights=share)
+    return FreeCurve(law, columns, heights, covariance, _root(span), evidence)
+
+
+@dataclass(frozen=True)
+class _Member:
+    """Curves or surfaces of one size and length: the log marginal likelihood, heights (knots,) with their covariance,
+    and the ``root`` (knots, r) that spans those which are likely before the campaign."""
+
+    evidence: float
+    heights: FloatArray
+    covariance: FloatArray
+    root: FloatArray
+
+
+def _mean_evidence(members: Sequence[_Member]) -> float:
+    return float(logsumexp([m.evidence for m in members]) - np.log(len(members)))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """What spans a covariance, (k, r), its flat directions left out."""
+    variance, directions = np.linalg.eigh(covariance)
     kept = variance > FLAT_BELOW * variance[-1]
-    prior = directions[:, kept] * np.sqrt(variance[kept])
-    mean = float(evidence.max() + np.log(np.mean(np.exp(evidence - evidence.max()))))
-    return FreeCurve(law, columns, heights, np.asarray(covariance), prior, mean)
+    return np.asarray(directions[:, kept] * np.sqrt(variance[kept]))
 
 
-def _member(
-    information: FloatArray, pull: FloatArray, root: FloatArray, informed: float
-) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-    """Log marginal likelihood, heights and their covariance for curves spanned by ``root`` (knots, r); and the root."""
+def _members_of_products(
+    shapes: Sequence[Shape], information: FloatArray, pull: FloatArray, informed: float
+) -> list[_Member]:
+    """Products of a curve of each column, all of the same lengths and sizes as the surfaces."""
+    one, other = (len(shape.values) for shape in shapes)
+    by_knots, pulls, sizes = information.reshape(one, other, one, other), pull.reshape(one, other), SIZES[2::2]
+    found = []
+    for kernels_of_both in _both_kernels(shapes):
+        a, b = (_root(1.0 + kernel) for kernel in kernels_of_both)
+        own = np.einsum("ijkl,ia,jb,kc,ld->abcd", by_knots, a, b, a, b, optimize=True)
+        p = likeliest_products(own, a.T @ pulls @ b, sizes)
+        for size, evidence, u, v, curvature in zip(sizes, p.evidence, p.first, p.second, p.curvature, strict=True):
+            first, second = a @ u, b @ v
+            root = size * np.concatenate(
+                [(a[:, None, :] * second[:, None]).reshape(one * other, -1),
+                 (first[:, None, None] * b).reshape(one * other, -1)], axis=1,
+            )  # fmt: skip
+            told = np.eye(len(curvature)) + informed * (curvature - np.eye(len(curvature)))
+            covariance = root @ np.linalg.inv(told) @ root.T
+            found.append(_Member(float(evidence), size * np.outer(first, second).ravel(), covariance, root))
+    return found
+
+
+@dataclass(frozen=True)
+class Products:
+    """The likeliest products of two curves, (b,) of them for as many sizes and noises.
+
+    Their ``evidence`` (b,) is the log marginal likelihood over none, by Laplace's approximation; ``first`` (b, n) and
+    ``second`` (b, m) are the amplitudes of both curves, ``curvature`` (b, n + m, n + m) that of the log posterior.
+    """
+
+    evidence: FloatArray
+    first: FloatArray
+    second: FloatArray
+    curvature: FloatArray
+
+
+def likeliest_products(
+    information: FloatArray, pull: FloatArray, size: FloatArray, noise: FloatArray | float = 1.0
+) -> Products:
+    """Products of two curves, each one amplitudes of a standard deviation of one times its courses: fewer numbers than
+    those of a surface.
+
+    One curve after the other is fitted with the other one held, from the two likeliest pairs on.
+
+    Parameters
+    ----------
+    information : array (n, m, n, m)
+        Of the products of n courses of one column with m of the other.
+    pull : array (n, m)
+    size : array (b,)
+        Standard deviation of the product, in ln T.
+    noise : array (b,) or float
+        Variance of the noise, of that at which the information holds.
+    """
+    n, m = pull.shape
+    of_first = information.transpose(0, 2, 1, 3).reshape(n * n, m * m)
+
+    def within(one: FloatArray, other: FloatArray) -> FloatArray:
+        squares = (other[:, :, None] * other[:, None]).reshape(len(other), -1)
+        k = math.isqrt(len(one))
+        return np.asarray(np.eye(k) + inform * (squares @ one.T).reshape(-1, k, k))
+
+    def fitted(one: FloatArray, towards: FloatArray, other: FloatArray) -> FloatArray:
+        right = draw * (other @ towards.T)[:, :, None]
+        return np.asarray(np.linalg.solve(within(one, other), right)[:, :, 0])
+
+    # from several second curves on, each at every size
+    starts = np.sqrt(m) * np.linalg.svd(pull)[2][: min(n, m, STARTS)]
+    second = np.repeat(starts, len(size), axis=0)
+    inform, draw = (np.tile(x, len(starts))[:, None, None] for x in (size**2 / noise, size / noise))
+    for _ in range(TURNS):
+        first = fitted(of_first, pull, second)
+        second = fitted(of_first.T, pull.T, first)
+        # of the same product, the likeliest amplitudes are of one length
+        one, other = (np.linalg.norm(x, axis=1, keepdims=True) + TINY for x in (first, second))
+        first, second = first * np.sqrt(other / one), second * np.sqrt(one / other)
+    both = first[:, :, None] * second[:, None, :]
+    own, other = within(of_first, second), within(of_first.T, first)
+    crossed = np.einsum("bkl,imkl->bim", both, information) + np.einsum("bkj,ijkm->bim", both, information)
+    crossed = inform * crossed - draw * pull
+    curvature = np.block([[own, crossed], [crossed.transpose(0, 2, 1), other]])
+    steepness, directions = np.linalg.eigh(curvature)
+    steepness = np.maximum(steepness, 1.0)  # that of the prior alone
+    curvature = (directions * steepness[:, None]) @ directions.transpose(0, 2, 1)
+    gained = draw[:, 0, 0] * np.sum(both * pull, axis=(1, 2))
+    lost = np.einsum("bi,bij,bj->b", first, own, first) + np.sum(second**2, axis=1) + np.sum(np.log(steepness), axis=1)
+    evidence = gained - 0.5 * lost
+    best = evidence.reshape(len(starts), -1).argmax(axis=0) * len(size) + np.arange(len(size))
+    return Products(evidence[best], first[best], second[best], curvature[best])
+
+
+def _member(information: FloatArray, pull: FloatArray, root: FloatArray, informed: float) -> _Member:
+    """Curves spanned by ``root``."""
     own, towards = root.T @ information @ root, root.T @ pull
     within = np.eye(len(own)) + own
     evidence = 0.5 * float(towards @ np.linalg.solve(within, towards)) - 0.5 * float(np.linalg.slogdet(within)[1])
     posterior = root @ np.linalg.inv(np.eye(len(own)) + informed * own) @ root.T
-    return evidence, posterior @ (informed * pull), posterior, root
+    return _Member(evidence, posterior @ (informed * pull), posterior, root)
 
 
 def better_left_out(model: ModelFit, with_formula: ModelFit, curve: FreeCurve, least: float = AS_GOOD) -> bool:

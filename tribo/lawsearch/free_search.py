@@ -1,13 +1,15 @@
 """Laws of no known form: the curve of one column and the surface of two that a campaign speaks for most.
 
 A surface is a Gaussian process over two columns, a course of each and what they do together (an analysis of variance in
-functions: Durrande, Ginsbourger and Roustant, J. Multivariate Anal. 115, 57, 2013). What a campaign says for one is its
-marginal likelihood, averaged over sizes, short lengths and long ones, less what the choice of the columns and of the
-scope costs; what chance gives the best of all is seen in campaigns that the model makes itself.
+functions: Durrande, Ginsbourger and Roustant, J. Multivariate Anal. 115, 57, 2013), or a product of two curves, which
+has far fewer numbers. What a campaign says for one is its marginal likelihood, averaged over sizes, short lengths and
+long ones, less what the choice of the columns and of the scope costs; what chance gives the best of all is seen in
+campaigns that the model makes itself.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -16,7 +18,7 @@ from itertools import combinations
 import numpy as np
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of
+from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of, likeliest_products
 from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, WrittenLaw, scopes_of
 from tribo.lawsearch.scoring import Projection, effects_of, terms_of
 from tribo.mechanisms.record import Conditions
@@ -26,6 +28,8 @@ OF_SERIES = {"run_order", "specimen_run", "elapsed_s", "clock_h"}  # days, drift
 MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a meaning of their own come first
 NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.15])  # variance that a law leaves where it acts, of that before
 DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface
+PRODUCTS = 12  # surfaces of a campaign that are weighed as products of two curves as well
+NOISES_OF_PRODUCTS, SIZES_OF_PRODUCTS = NOISES[::2], SIZES[1::2]
 OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts no more
 LEAST = 0.1  # of the square that is expected, in proportion to which a law leaves noise
 
@@ -115,7 +119,35 @@ class FreeSearch:
                     for course, (along, directions) in zip(courses, short_and_long, strict=True)
                 ]
                 found[:, f, g] = np.logaddexp.reduce(each) - np.log(len(each))
-        return found - self.cost
+        found -= self.cost
+        surfaces = [f for f, each in enumerate(self.columns) if len(each) > 1]
+        if surfaces:
+            self._weigh_products(found, surfaces, left, beyond, free)
+        return found
+
+    def _weigh_products(
+        self, found: FloatArray, surfaces: Sequence[int], left: FloatArray, beyond: FloatArray, free: FloatArray
+    ) -> None:
+        """Of each campaign, average the evidence ``found`` of its likeliest surfaces with that of a product of two
+        curves; the other surfaces are taken to say nothing of a product.
+
+        Every two columns come with their likeliest scope first, so that none is left out for another one's scopes.
+        """
+        order = np.argsort(-found[:, surfaces], axis=2)[:, :, :PRODUCTS]
+        value = np.take_along_axis(found[:, surfaces], order, axis=2)
+        rank = np.broadcast_to(np.arange(order.shape[2]), order.shape[1:])
+        found[:, surfaces] -= np.log(2.0)
+        for r in range(len(found)):
+            first = np.lexsort((-value[r].ravel(), rank.ravel()))[:PRODUCTS]
+            for f, g in zip(first // order.shape[2], order[r].ravel()[first], strict=True):
+                pull = np.einsum("in,in->n", self.rows[g], left[:, :, r]) / np.sqrt(beyond[g, r])
+                short_and_long = zip(self.courses[surfaces[f]], self.spectra[g][surfaces[f]], strict=True)
+                each = [
+                    _evidence_of_product(course.T @ pull, along, directions, free[g])
+                    for course, (along, directions) in short_and_long
+                ]
+                product = np.logaddexp.reduce(each) - np.log(2.0 * len(each)) - self.cost[surfaces[f], g]
+                found[r, surfaces[f], g] = np.logaddexp(found[r, surfaces[f], g], product)
 
 
 def without_outliers(model: ModelFit) -> ModelFit:
@@ -141,6 +173,19 @@ def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:
     best = each.max(axis=1, keepdims=True)
     mean = best[:, 0] + np.log(np.mean(np.exp(each - best), axis=1))
     return np.asarray(mean.max(axis=0))
+
+
+def _evidence_of_product(pull: FloatArray, along: FloatArray, directions: FloatArray, free: float) -> float:
+    """The same for a product of two curves, of the pulls (k,) of the courses of a surface and the information along its
+    principal directions."""
+    k = math.isqrt(len(pull) + 1)
+    information, pulls = np.zeros((k * k, k * k)), np.zeros(k * k)
+    information[1:, 1:], pulls[1:] = (directions * along) @ directions.T, pull
+    noise = np.repeat(NOISES_OF_PRODUCTS, len(SIZES_OF_PRODUCTS))
+    sizes = np.tile(SIZES_OF_PRODUCTS, len(NOISES_OF_PRODUCTS))
+    told = likeliest_products(information.reshape(k, k, k, k), pulls.reshape(k, k), sizes, noise).evidence
+    each = (told - 0.5 * free * (np.log(noise) + 1.0 / noise - 1.0)).reshape(len(NOISES_OF_PRODUCTS), -1)
+    return float(np.max(np.logaddexp.reduce(each, axis=1)) - np.log(each.shape[1]))
 
 
 def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> list[list[FloatArray]]:
