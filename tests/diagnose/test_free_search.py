@@ -85,12 +85,12 @@ def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypa
 def test_the_evidence_of_a_product_of_two_curves_is_its_marginal_likelihood_over_none() -> None:
     """Laplace's approximation, of the likelier half: the same product with both signs turned is as likely."""
     rng, size = np.random.default_rng(1), 0.5
-    courses = rng.normal(size=(200, 4))
-    measured = courses @ np.outer([1.0, 0.4], [0.6, -0.8]).ravel() + rng.normal(size=200)
-    information, pull = (courses.T @ courses).reshape(2, 2, 2, 2), (courses.T @ measured).reshape(2, 2)
+    courses = rng.normal(size=(200, 6))
+    measured = courses @ np.outer([1.0, 0.4], [0.6, -0.8, 0.3]).ravel() + rng.normal(size=200)
+    information, pull = (courses.T @ courses).reshape(2, 3, 2, 3), (courses.T @ measured).reshape(2, 3)
     (found,) = likeliest_products(information, pull, np.array([size])).evidence
-    drawn = rng.normal(size=(2, 1_000_000, 2))
-    products = size * (drawn[0][:, :, None] * drawn[1][:, None]).reshape(-1, 4)
+    first, second = rng.normal(size=(4_000_000, 2)), rng.normal(size=(4_000_000, 3))
+    products = size * (first[:, :, None] * second[:, None]).reshape(-1, 6)
     likely = products @ pull.ravel() - 0.5 * np.sum((products @ (courses.T @ courses)) * products, axis=1)
     expected = np.logaddexp.reduce(likely) - np.log(len(likely))
     assert expected > 40.0

@@ -59,6 +59,8 @@ class FreeSearch:
         beside = max(len(names) - 1, 1)
         self.cost = np.array([np.log(beside) if len(each) > 1 else 0.0 for each in columns])[:, None] + cost
         self.courses = _principal_courses(c, columns)
+        # of both curves of a product the number of courses, one of them a constant; a column of few values has fewer
+        self.sides = [tuple(1 + _directions(name, c) for name in each) for each in columns]
         self.projected = Projection(self.model, model.residual[None])
         effects = effects_of(scopes, c, terms_of(model))
         factor = self.projected.factor
@@ -143,7 +145,7 @@ class FreeSearch:
                 pull = np.einsum("in,in->n", self.rows[g], left[:, :, r]) / np.sqrt(beyond[g, r])
                 short_and_long = zip(self.courses[surfaces[f]], self.spectra[g][surfaces[f]], strict=True)
                 each = [
-                    _evidence_of_product(course.T @ pull, along, directions, free[g])
+                    _evidence_of_product(course.T @ pull, along, directions, self.sides[surfaces[f]], free[g])
                     for course, (along, directions) in short_and_long
                 ]
                 product = np.logaddexp.reduce(each) - np.log(2.0 * len(each)) - self.cost[surfaces[f], g]
@@ -175,15 +177,24 @@ def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:
     return np.asarray(mean.max(axis=0))
 
 
-def _evidence_of_product(pull: FloatArray, along: FloatArray, directions: FloatArray, free: float) -> float:
-    """The same for a product of two curves, of the pulls (k,) of the courses of a surface and the information along its
-    principal directions."""
-    k = math.isqrt(len(pull) + 1)
-    information, pulls = np.zeros((k * k, k * k)), np.zeros(k * k)
+def _directions(name: str, c: Conditions) -> int:
+    """How many principal courses of a column a surface has."""
+    shape = knots_of(name, c)
+    assert shape is not None
+    return min(len(shape.values), DIRECTIONS[2])
+
+
+def _evidence_of_product(
+    pull: FloatArray, along: FloatArray, directions: FloatArray, sides: tuple[int, ...], free: float
+) -> float:
+    """The same for a product of two curves of ``sides`` courses each, of the pulls (k,) of the courses of a surface and
+    the information along its principal directions."""
+    k = math.prod(sides)
+    information, pulls = np.zeros((k, k)), np.zeros(k)
     information[1:, 1:], pulls[1:] = (directions * along) @ directions.T, pull
     noise = np.repeat(NOISES_OF_PRODUCTS, len(SIZES_OF_PRODUCTS))
     sizes = np.tile(SIZES_OF_PRODUCTS, len(NOISES_OF_PRODUCTS))
-    told = likeliest_products(information.reshape(k, k, k, k), pulls.reshape(k, k), sizes, noise).evidence
+    told = likeliest_products(information.reshape(*sides, *sides), pulls.reshape(sides), sizes, noise).evidence
     each = (told - 0.5 * free * (np.log(noise) + 1.0 / noise - 1.0)).reshape(len(NOISES_OF_PRODUCTS), -1)
     return float(np.max(np.logaddexp.reduce(each, axis=1)) - np.log(each.shape[1]))
 
