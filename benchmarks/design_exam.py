@@ -114,10 +114,8 @@ def truth(target: Target, pattern: Pattern, seed: int, halved: bool) -> list[flo
 def runs_of(target: Target) -> int:
     """Runs of a search."""
     points = len({r[1:] for r in responses(target)})
-    first = sum(rounds.first_designs(Space(family, k)) for k, family in enumerate(target.pattern))
-    many = any(len(Space(family, k).free) > rounds.FEW for k, family in enumerate(target.pattern))
-    further = rounds.ROUNDS_OF_MANY * rounds.BATCH_OF_MANY if many else rounds.ROUNDS * rounds.BATCH
-    coarse = (first + further) * rounds.COARSE_RUNS
+    spaces = [Space(family, k) for k, family in enumerate(target.pattern)]
+    coarse = (sum(map(rounds.first_designs, spaces)) + math.prod(rounds.rounds_of(spaces))) * rounds.COARSE_RUNS
     return points * (coarse + rounds.FINAL * rounds.FINE_RUNS + 4)
 
 

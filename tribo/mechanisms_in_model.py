@@ -30,7 +30,7 @@ from tribo.springblock.config import LocalFriction, SimConfig
 from tribo.springblock.engines import ENGINES
 from tribo.springblock.engines.state import Thresholds, lattice_of, thresholds_of
 from tribo.springblock.lattice import SIDES, Lattice, pattern_of
-from tribo.springblock.run import MOST_TIMES_LONGER, ends_too_early, longer, run_of, simulate
+from tribo.springblock.run import run_of, simulate, until_it_slides
 
 SLED_AREA_M2 = 55e-6
 
@@ -250,9 +250,7 @@ def run_with(
             thresholds = on_rims(changed, thresholds, placement.rims(values), conditions)
     integrate = ENGINES[changed.engine].integrate
     trajectory = integrate(changed, lattice, thresholds, 1)
-    for _ in range(MOST_TIMES_LONGER):
-        if ends_too_early(changed, trajectory):
-            trajectory = integrate(longer(changed, trajectory), lattice, thresholds, 1)
+    trajectory = until_it_slides(changed, trajectory, lambda longer: integrate(longer, lattice, thresholds, 1))
     return run_of(changed, trajectory, float(lattice_of(changed).area_fraction))
 
 

@@ -89,7 +89,7 @@ def test_the_evidence_of_a_product_of_two_curves_is_its_marginal_likelihood_over
     measured = courses @ np.outer([1.0, 0.4], [0.6, -0.8, 0.3]).ravel() + rng.normal(size=200)
     information, pull = (courses.T @ courses).reshape(2, 3, 2, 3), (courses.T @ measured).reshape(2, 3)
     (found,) = likeliest_products(information, pull, np.array([size])).evidence
-    first, second = rng.normal(size=(4_000_000, 2)), rng.normal(size=(4_000_000, 3))
+    first, second = rng.normal(size=(1_000_000, 2)), rng.normal(size=(1_000_000, 3))
     products = size * (first[:, :, None] * second[:, None]).reshape(-1, 6)
     likely = products @ pull.ravel() - 0.5 * np.sum((products @ (courses.T @ courses)) * products, axis=1)
     expected = np.logaddexp.reduce(likely) - np.log(len(likely))

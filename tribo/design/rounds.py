@@ -336,7 +336,7 @@ def promising(
         candidates = space.candidates(CANDIDATES, seed)
         if not candidates or number not in surrogates:
             continue
-        if len(space.free) > FEW:
+        if has_many_lengths([space]):
             best = sorted((t for t in known if t.space == number), key=aim.cost_of)[:CLIMBED]
             candidates += [each for t in best for each in space.candidates_near(t.lengths_um, BESIDE, seed)]
         x = np.array([space.at(lengths) for lengths in candidates])
@@ -367,6 +367,16 @@ def first_designs(space: Space) -> int:
     return round(FIRST * FURTHER ** max(len(space.free) - FEW, 0))
 
 
+def has_many_lengths(spaces: Sequence[Space]) -> bool:
+    """Whether coarse runs order the designs of a family too poorly to search with them."""
+    return any(len(space.free) > FEW for space in spaces)
+
+
+def rounds_of(spaces: Sequence[Space]) -> tuple[int, int]:
+    """How many rounds follow, and how many designs each has."""
+    return (ROUNDS_OF_MANY, BATCH_OF_MANY) if has_many_lengths(spaces) else (ROUNDS, BATCH)
+
+
 def search(
     all_rounds: Rounds, aim: Aim, base: SimConfig, say: Say
 ) -> tuple[list[Tried], list[Tried], list[Tried], Surrogates]:
@@ -381,9 +391,9 @@ def search(
     spaces, wanted, seed = all_rounds.spaces, all_rounds.wanted, all_rounds.seed
     coarse, fine, patch, halved = (on_mesh(base, name) for name in MESHES)
     points = len({r[1:] for r in wanted})
-    many = any(len(space.free) > FEW for space in spaces)
-    searched, weight = (fine, 12) if many else (coarse, 1)  # a fine run takes about twelve coarse ones
-    turns, batch_size = (ROUNDS_OF_MANY, BATCH_OF_MANY) if many else (ROUNDS, BATCH)
+    # a fine run takes about as long as twelve coarse ones
+    searched, weight = (fine, 12) if has_many_lengths(spaces) else (coarse, 1)
+    turns, batch_size = rounds_of(spaces)
     steps = (sum(first_designs(space) for space in spaces) + turns * batch_size) * COARSE_RUNS * points * weight
     total, done = steps + 2 * FINAL * FINE_RUNS * points * 12, 0
 

@@ -146,12 +146,10 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
     columns = courses[:, None, :] * effects[:, :, None]
     rows, residual = without.cleared(columns)
     information, pull = rows.T @ rows, rows.T @ residual
-    found = []
-    for kernel in likely(law.shapes):
-        root = _root(kernel)
-        sizes = SIZES if len(law.shapes) == 1 else SIZES[2::2]
-        found += [_member(information, pull, size * root, informed) for size in sizes]
-    span = np.average([m.root @ m.root.T for m in found], axis=0, weights=softmax([m.evidence for m in found]))
+    sizes = SIZES if len(law.shapes) == 1 else SIZES[2::2]
+    roots = [size * root for root in map(_root, likely(law.shapes)) for size in sizes]
+    found = [_member(information, pull, root, informed) for root in roots]
+    span = np.average([root @ root.T for root in roots], axis=0, weights=softmax([m.evidence for m in found]))
     evidence = _mean_evidence(found)
     if len(law.shapes) > 1:
         products = _members_of_products(law.shapes, information, pull, informed)
@@ -167,13 +165,11 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
 
 @dataclass(frozen=True)
 class _Member:
-    """Curves or surfaces of one size and length: the log marginal likelihood, heights (knots,) with their covariance,
-    and the ``root`` (knots, r) that spans those which are likely before the campaign."""
+    """Curves or surfaces of one size and length: log marginal likelihood, heights (knots,) and their covariance."""
 
     evidence: float
     heights: FloatArray
     covariance: FloatArray
-    root: FloatArray
 
 
 def _mean_evidence(members: Sequence[_Member]) -> float:
@@ -206,7 +202,7 @@ def _members_of_products(
             )  # fmt: skip
             told = np.eye(len(curvature)) + informed * (curvature - np.eye(len(curvature)))
             covariance = root @ np.linalg.inv(told) @ root.T
-            found.append(_Member(float(evidence), size * np.outer(first, second).ravel(), covariance, root))
+            found.append(_Member(float(evidence), size * np.outer(first, second).ravel(), covariance))
     return found
 
 
@@ -280,12 +276,12 @@ def likeliest_products(
 
 
 def _member(information: FloatArray, pull: FloatArray, root: FloatArray, informed: float) -> _Member:
-    """Curves spanned by ``root``."""
+    """Curves spanned by ``root`` (knots, r)."""
     own, towards = root.T @ information @ root, root.T @ pull
     within = np.eye(len(own)) + own
     evidence = 0.5 * float(towards @ np.linalg.solve(within, towards)) - 0.5 * float(np.linalg.slogdet(within)[1])
     posterior = root @ np.linalg.inv(np.eye(len(own)) + informed * own) @ root.T
-    return _Member(evidence, posterior @ (informed * pull), posterior, root)
+    return _Member(evidence, posterior @ (informed * pull), posterior)
 
 
 def better_left_out(model: ModelFit, with_formula: ModelFit, curve: FreeCurve, least: float = AS_GOOD) -> bool:

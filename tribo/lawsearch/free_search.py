@@ -58,9 +58,7 @@ class FreeSearch:
         names = {name for each in columns for name in each}
         beside = max(len(names) - 1, 1)
         self.cost = np.array([np.log(beside) if len(each) > 1 else 0.0 for each in columns])[:, None] + cost
-        self.courses = _principal_courses(c, columns)
-        # of both curves of a product the number of courses, one of them a constant; a column of few values has fewer
-        self.sides = [tuple(1 + _directions(name, c) for name in each) for each in columns]
+        self.courses, self.sides = _principal_courses(c, columns)
         self.projected = Projection(self.model, model.residual[None])
         effects = effects_of(scopes, c, terms_of(model))
         factor = self.projected.factor
@@ -141,15 +139,15 @@ class FreeSearch:
         found[:, surfaces] -= np.log(2.0)
         for r in range(len(found)):
             first = np.lexsort((-value[r].ravel(), rank.ravel()))[:PRODUCTS]
-            for f, g in zip(first // order.shape[2], order[r].ravel()[first], strict=True):
+            for s, g in zip(first // order.shape[2], order[r].ravel()[first], strict=True):
+                f = surfaces[s]
                 pull = np.einsum("in,in->n", self.rows[g], left[:, :, r]) / np.sqrt(beyond[g, r])
-                short_and_long = zip(self.courses[surfaces[f]], self.spectra[g][surfaces[f]], strict=True)
                 each = [
-                    _evidence_of_product(course.T @ pull, along, directions, self.sides[surfaces[f]], free[g])
-                    for course, (along, directions) in short_and_long
+                    _evidence_of_product(course.T @ pull, along, directions, self.sides[f], free[g])
+                    for course, (along, directions) in zip(self.courses[f], self.spectra[g][f], strict=True)
                 ]
-                product = np.logaddexp.reduce(each) - np.log(2.0 * len(each)) - self.cost[surfaces[f], g]
-                found[r, surfaces[f], g] = np.logaddexp(found[r, surfaces[f], g], product)
+                product = np.logaddexp.reduce(each) - np.log(2.0 * len(each)) - self.cost[f, g]
+                found[r, f, g] = np.logaddexp(found[r, f, g], product)
 
 
 def without_outliers(model: ModelFit) -> ModelFit:
@@ -177,13 +175,6 @@ def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:
     return np.asarray(mean.max(axis=0))
 
 
-def _directions(name: str, c: Conditions) -> int:
-    """How many principal courses of a column a surface has."""
-    shape = knots_of(name, c)
-    assert shape is not None
-    return min(len(shape.values), DIRECTIONS[2])
-
-
 def _evidence_of_product(
     pull: FloatArray, along: FloatArray, directions: FloatArray, sides: tuple[int, ...], free: float
 ) -> float:
@@ -199,9 +190,12 @@ def _evidence_of_product(
     return float(np.max(np.logaddexp.reduce(each, axis=1)) - np.log(each.shape[1]))
 
 
-def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> list[list[FloatArray]]:
+def _principal_courses(
+    c: Conditions, columns: Sequence[tuple[str, ...]]
+) -> tuple[list[list[FloatArray]], list[tuple[int, ...]]]:
     """The principal courses over the tests (n, k) of each curve and surface, of short lengths and of long ones, each of
-    a standard deviation of one in the process that it comes from."""
+    a standard deviation of one in the process that it comes from; and how many each of its columns has with a constant,
+    fewer where it has few values."""
     of_column: dict[tuple[str, int], list[FloatArray]] = {}
     for name, alone in {(name, len(each)) for each in columns for name in each}:
         shape = (curve_of(name, c) if alone == 1 else None) or knots_of(name, c)
@@ -211,11 +205,12 @@ def _principal_courses(c: Conditions, columns: Sequence[tuple[str, ...]]) -> lis
             variance, directions = np.linalg.eigh(np.mean(covariances, axis=0))
             course = at @ (directions * np.sqrt(np.maximum(variance, 0.0)))
             of_column.setdefault((name, alone), []).append(course[:, ::-1][:, : DIRECTIONS[alone]])
-    found = []
+    found, sides = [], []
     for each in columns:
-        short_and_long = zip(*(of_column[name, len(each)] for name in each), strict=True)
-        found.append([_together(courses) for courses in short_and_long])
-    return found
+        own = [of_column[name, len(each)] for name in each]
+        found.append([_together(courses) for courses in zip(*own, strict=True)])
+        sides.append(tuple(1 + short.shape[1] for short, _ in own))
+    return found, sides
 
 
 def _together(courses: Sequence[FloatArray]) -> FloatArray:

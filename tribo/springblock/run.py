@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tribo.errors import Problem, SimulationError
@@ -57,24 +59,23 @@ def simulate(config: SimConfig, threads: int = 1) -> Run:
         )
     integrate, thresholds = ENGINES[config.engine].integrate, thresholds_of(config, lattice)
     trajectory = integrate(config, lattice, thresholds, threads)
-    for _ in range(MOST_TIMES_LONGER):
-        if ends_too_early(config, trajectory):
-            trajectory = integrate(longer(config, trajectory), lattice, thresholds, threads)
+    trajectory = until_it_slides(config, trajectory, lambda longer: integrate(longer, lattice, thresholds, threads))
     return run_of(config, trajectory, float(lattice.area_fraction))
 
 
-def ends_too_early(config: SimConfig, trajectory: Trajectory) -> bool:
-    """Whether the highest force came so late that the sliding window begins after the end.
+def until_it_slides(
+    config: SimConfig, trajectory: Trajectory, integrate: Callable[[SimConfig], Trajectory]
+) -> Trajectory:
+    """The trajectory of a run, integrated for longer where its sliding window would begin after its end.
 
-    That of few blocks may come among the slips of sliding. A run whose length is given does not go on.
+    The highest force of few blocks may come late, among the slips of sliding. A run whose length is given does not go
+    on.
     """
-    too_late = trajectory.time_s[-1] <= config.window_start_peaks * trajectory.peak_s
-    return bool(config.duration_s is None and too_late)
-
-
-def longer(config: SimConfig, trajectory: Trajectory) -> SimConfig:
-    """A run that lasts as many peak times as asked for, of the peak that a run before it has found."""
-    return config.with_(duration_s=config.duration_peaks * trajectory.peak_s)
+    for _ in range(MOST_TIMES_LONGER):
+        if config.duration_s is not None or trajectory.time_s[-1] > config.window_start_peaks * trajectory.peak_s:
+            break
+        trajectory = integrate(config.with_(duration_s=config.duration_peaks * trajectory.peak_s))
+    return trajectory
 
 
 def run_of(config: SimConfig, trajectory: Trajectory, area_fraction: float) -> Run:
