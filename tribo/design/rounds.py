@@ -86,7 +86,7 @@ def fitted(x: FloatArray, y: FloatArray, noise: float) -> Surrogate:
 COARSE_RUNS, FINE_RUNS = 2, 4
 FIRST, ROUNDS, BATCH, FINAL = 14, 3, 5, 6
 FEW = 2  # free lengths of a family, along which friction is smooth enough for few designs and coarse runs
-FURTHER = 2.7  # times as many first designs for every length beyond these: 38 and 100
+FURTHER = 2.7  # times as many first designs for every length beyond these: 38 and 102
 ROUNDS_OF_MANY, BATCH_OF_MANY, CLIMBED, BESIDE = 6, 8, 3, 128  # of many lengths: also designs beside the best few
 CANDIDATES = 2048
 APART = 0.05  # of the span of a length or of the area fraction, between two designs of a round
