@@ -16,6 +16,7 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from scipy.special import logsumexp
 
 from tribo.diagnostics.fit import ModelFit
 from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of, likeliest_products
@@ -69,9 +70,15 @@ class FreeSearch:
         )  # fmt: skip
         self.spectra = [self._spectra(rows) for rows in self.rows]
         self.acts_on = np.any(self.rows != 0.0, axis=1)  # which tests, (scopes, n)
-        p = self.projected
-        # expected square of what the model does not absorb of both numbers of every test, (n,)
-        self.not_absorbed = (1.0 - np.sum(p.own**2, axis=1) - np.sum(p.border**2, axis=1)).reshape(2, -1).sum(axis=0)
+        # the direction of both numbers of a test in which a law moves them, (scopes, 2, n)
+        size = np.linalg.norm(self.rows, axis=1, keepdims=True)
+        self.towards = self.rows / np.where(size > 0.0, size, 1.0)
+        absorbed = np.concatenate([self.projected.own, self.projected.border], axis=1).reshape(2, len(c.sample), -1)
+        along = [np.sum(np.einsum("in,inm->nm", towards, absorbed) ** 2) for towards in self.towards]
+        # expected square of what the model does not absorb, of both numbers of every test (n,), in that direction of
+        # all tests that a law moves (scopes,)
+        self.not_absorbed = 2.0 - np.sum(absorbed**2, axis=(0, 2))
+        self.not_absorbed_along = self.acts_on.sum(axis=1) - np.array(along)
 
     def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
@@ -103,30 +110,33 @@ class FreeSearch:
         (r, n, 2) of ln T, (r, columns, scopes).
 
         What a law explains is not noise: each is judged at the noise that it leaves, in proportion to what the model
-        leaves unabsorbed on the samples where it acts.
+        leaves unabsorbed on the samples where it acts. It leaves less of both numbers of a test, or less only in the
+        direction in which it acts: what is found is the mean over both.
         """
         projected = Projection(self.model, residual)
         left = projected.left.reshape(2, projected.n, -1)
         squares = self.acts_on @ np.sum(left**2, axis=0)
-        free = 2.0 * self.acts_on.sum(axis=1)
         beyond = np.maximum(squares / (self.acts_on @ self.not_absorbed)[:, None], LEAST)
+        squares = np.array([np.sum(np.einsum("in,inr->nr", towards, left) ** 2, axis=0) for towards in self.towards])
+        ratio = np.maximum(squares / self.not_absorbed_along[:, None], LEAST) / beyond
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
         for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
             pull = np.einsum("in,inr->nr", rows, left)
+            price = _price_of_noise(NOISES, ratio[g], int(self.acts_on[g].sum()))
             for f, (courses, short_and_long) in enumerate(zip(self.courses, spectra, strict=True)):
                 each = [
-                    _evidence(along, (directions.T @ (course.T @ pull)) ** 2 / beyond[g], free[g])
+                    _evidence(along, (directions.T @ (course.T @ pull)) ** 2 / beyond[g], price)
                     for course, (along, directions) in zip(courses, short_and_long, strict=True)
                 ]
                 found[:, f, g] = np.logaddexp.reduce(each) - np.log(len(each))
         found -= self.cost
         surfaces = [f for f, each in enumerate(self.columns) if len(each) > 1]
         if surfaces:
-            self._weigh_products(found, surfaces, left, beyond, free)
+            self._weigh_products(found, surfaces, left, beyond, ratio)
         return found
 
     def _weigh_products(
-        self, found: FloatArray, surfaces: Sequence[int], left: FloatArray, beyond: FloatArray, free: FloatArray
+        self, found: FloatArray, surfaces: Sequence[int], left: FloatArray, beyond: FloatArray, ratio: FloatArray
     ) -> None:
         """Of each campaign, average the evidence ``found`` of its likeliest surfaces with that of a product of two
         curves; the other surfaces are taken to say nothing of a product.
@@ -142,8 +152,9 @@ class FreeSearch:
             for s, g in zip(first // order.shape[2], order[r].ravel()[first], strict=True):
                 f = surfaces[s]
                 pull = np.einsum("in,in->n", self.rows[g], left[:, :, r]) / np.sqrt(beyond[g, r])
+                price = _price_of_noise(NOISES_OF_PRODUCTS, ratio[g, [r]], int(self.acts_on[g].sum()))
                 each = [
-                    _evidence_of_product(course.T @ pull, along, directions, self.sides[f], free[g])
+                    _evidence_of_product(course.T @ pull, along, directions, self.sides[f], price)
                     for course, (along, directions) in zip(self.courses[f], self.spectra[g][f], strict=True)
                 ]
                 product = np.logaddexp.reduce(each) - np.log(2.0 * len(each)) - self.cost[f, g]
@@ -161,22 +172,32 @@ def without_outliers(model: ModelFit) -> ModelFit:
     return replace(model, weight=np.ones(len(near)), residual=residual)
 
 
-def _evidence(along: FloatArray, pulls: FloatArray, free: float) -> FloatArray:
-    """Log marginal likelihood (r,) from the information along (k,) and the squared pulls (k, r), at noise that ``free``
-    numbers tell of: averaged over sizes, at the likeliest noise."""
+def _price_of_noise(noises: FloatArray, ratio: FloatArray, moved: int) -> FloatArray:
+    """What it costs in log likelihood that a law leaves so much noise, (2, noises, r): of both numbers of the ``moved``
+    tests, and of one number of each, whose noise without the law is ``ratio`` (r,) of that of both."""
+    share = np.stack([np.ones(len(ratio)), ratio])[:, None, :] / noises[:, None]
+    return np.asarray(0.5 * moved * np.array([2.0, 1.0])[:, None, None] * (share - 1.0 - np.log(share)))
+
+
+def _evidence(along: FloatArray, pulls: FloatArray, price: FloatArray) -> FloatArray:
+    """Log marginal likelihood (r,) from the information along (k,) and the squared pulls (k, r), with the ``price``
+    (2, noises, r) of noise: averaged over sizes, at the likeliest noise."""
     noise = np.repeat(NOISES, len(SIZES))
     variance = np.tile(SIZES**2, len(NOISES))
     informed = 1.0 + (variance / noise)[:, None] * along  # (noises sizes, k)
     explained = (variance / noise**2)[:, None] / informed @ pulls
-    lost = np.sum(np.log(informed), axis=1) + free * (np.log(noise) + 1.0 / noise - 1.0)
-    each = (0.5 * (explained - lost[:, None])).reshape(len(NOISES), len(SIZES), -1)
-    best = each.max(axis=1, keepdims=True)
-    mean = best[:, 0] + np.log(np.mean(np.exp(each - best), axis=1))
-    return np.asarray(mean.max(axis=0))
+    each = 0.5 * (explained - np.sum(np.log(informed), axis=1)[:, None])
+    return _at_likeliest_noise(each.reshape(len(NOISES), len(SIZES), -1), price)
+
+
+def _at_likeliest_noise(each: FloatArray, price: FloatArray) -> FloatArray:
+    """Of log likelihoods (noises, sizes, r) the mean over sizes at the likeliest noise, (r,)."""
+    mean = logsumexp(each, axis=1) - np.log(each.shape[1])
+    return np.asarray(np.logaddexp.reduce((mean - price).max(axis=1)) - np.log(len(price)))
 
 
 def _evidence_of_product(
-    pull: FloatArray, along: FloatArray, directions: FloatArray, sides: tuple[int, ...], free: float
+    pull: FloatArray, along: FloatArray, directions: FloatArray, sides: tuple[int, ...], price: FloatArray
 ) -> float:
     """The same for a product of two curves of ``sides`` courses each, of the pulls (k,) of the courses of a surface and
     the information along its principal directions."""
@@ -186,8 +207,7 @@ def _evidence_of_product(
     noise = np.repeat(NOISES_OF_PRODUCTS, len(SIZES_OF_PRODUCTS))
     sizes = np.tile(SIZES_OF_PRODUCTS, len(NOISES_OF_PRODUCTS))
     told = likeliest_products(information.reshape(*sides, *sides), pulls.reshape(sides), sizes, noise).evidence
-    each = (told - 0.5 * free * (np.log(noise) + 1.0 / noise - 1.0)).reshape(len(NOISES_OF_PRODUCTS), -1)
-    return float(np.max(np.logaddexp.reduce(each, axis=1)) - np.log(each.shape[1]))
+    return float(_at_likeliest_noise(told.reshape(len(NOISES_OF_PRODUCTS), -1, 1), price)[0])
 
 
 def _principal_courses(
