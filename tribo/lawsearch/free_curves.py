@@ -4,7 +4,8 @@ with its band.
 A curve is held at knots along the column. It is uncertain by what the campaign leaves open, averaged over how large,
 how smooth and how fast it may be (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and
 5). A surface may be a product of two curves; what a campaign says for that follows from Laplace's approximation
-(Tierney and Kadane, J. Am. Stat. Assoc. 81, 82, 1986). The band of a formula is that of the curve of its column: the
+(Tierney and Kadane, J. Am. Stat. Assoc. 81, 82, 1986). Or it may be a tree of four leaves, each of one value (Chipman,
+George and McCulloch, J. Am. Stat. Assoc. 93, 935, 1998). The band of a formula is that of the curve of its column: the
 formula was chosen among many once the data had been seen, the curve was not.
 """
 
@@ -38,6 +39,7 @@ KNOTS = 25
 ALONG = 13  # knots of a surface along each column
 LENGTHS = (0.07, 0.15, 0.3, 0.6)  # over which a curve changes, in shares of the range of the column
 SIZES = np.geomspace(0.005, 0.5, 9)  # standard deviation of a curve, in ln T
+TREES = 60  # of one size, the likeliest ones, of which a surface is told
 STARTS, TURNS, TINY = 2, 8, 1e-9  # of the fit of a product of two curves: from where, how often each, a length above 0
 FLAT_BELOW = 1e-7  # of the largest variance of a curve along its principal directions, below which one is left out
 FOLDS = 5  # of whole specimens that are left out
@@ -152,10 +154,12 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
     span = np.average([root @ root.T for root in roots], axis=0, weights=softmax([m.evidence for m in found]))
     evidence = _mean_evidence(found)
     if len(law.shapes) > 1:
-        products = _members_of_products(law.shapes, information, pull, informed)
-        even = np.log(len(found)) - np.log(len(products))  # products of curves together count as much as surfaces
-        evidence = float(np.logaddexp(evidence, _mean_evidence(products)) - np.log(2.0))
-        found += [replace(m, evidence=m.evidence + even) for m in products]
+        kinds = (
+            found, _members_of_products(law.shapes, information, pull, informed),
+            _members_of_trees(law.shapes, information, pull, informed),
+        )  # fmt: skip
+        evidence = float(logsumexp([_mean_evidence(kind) for kind in kinds]) - np.log(len(kinds)))
+        found = [replace(m, evidence=m.evidence - np.log(len(kind))) for kind in kinds for m in kind]
     share = softmax([m.evidence for m in found])
     heights = np.average([m.heights for m in found], axis=0, weights=share)
     spread = [m.covariance + np.outer(m.heights - heights, m.heights - heights) for m in found]
@@ -204,6 +208,89 @@ def _members_of_products(
             covariance = root @ np.linalg.inv(told) @ root.T
             found.append(_Member(float(evidence), size * np.outer(first, second).ravel(), covariance))
     return found
+
+
+def _members_of_trees(
+    shapes: Sequence[Shape], information: FloatArray, pull: FloatArray, informed: float
+) -> list[_Member]:
+    """The likeliest trees of each size of the surfaces; together they count as much as all trees of these sizes."""
+    sides = tuple(len(shape.values) for shape in shapes)
+    trees, sizes = Trees(information.reshape(*sides, *sides)), SIZES[2::2]
+    pulls = trees.pulls(pull.reshape(sides))
+    every = trees.evidence(pulls, sizes)
+    found = []
+    for size, each in zip(sizes, every.T, strict=True):
+        for k in np.argsort(-each)[:TREES]:
+            told = size**2 / (1.0 + informed * size**2 * trees.along[k])
+            along = trees.leaves(int(k)) @ trees.directions[k]
+            found.append(_Member(float(each[k]), along @ (informed * told * pulls[k]), (along * told) @ along.T))
+    lost = float(logsumexp(every) - np.log(every.size)) - _mean_evidence(found)
+    return [replace(m, evidence=m.evidence + lost) for m in found]
+
+
+class Trees:
+    """All trees over the knots of a surface: one column is split once, and either side of it once in the other column.
+
+    Parameters
+    ----------
+    information : array (n, m, n, m)
+        Of the n knots of one column with the m of the other.
+
+    Attributes
+    ----------
+    at : array (trees, 4)
+        Which column is split first and at which of its knots, and at which ones the other column is on either side.
+    along, directions : arrays (trees, 4), (trees, 4, 4)
+        Information of the four leaves along their principal directions.
+    """
+
+    def __init__(self, information: FloatArray) -> None:
+        self.sides = information.shape[:2]
+        at, found = [], []
+        for first, whole in enumerate((information, information.transpose(1, 0, 3, 2))):
+            one, other = (_either_side(k) for k in whole.shape[:2])
+            of_sides = np.einsum("sajkl,sbk->sabjl", np.einsum("sai,ijkl->sajkl", one, whole), one)
+            of_leaves = np.einsum("sabtcl,udl->sabtcud", np.einsum("sabjl,tcj->sabtcl", of_sides, other), other)
+            s, *split = (x.ravel() for x in np.indices((len(one), len(other), len(other))))
+            own = np.empty((len(s), 2, 2, 2, 2))
+            for a, b in product((0, 1), repeat=2):
+                own[:, a, :, b] = of_leaves[s, a, b, split[a], :, split[b]]
+            at.append(np.column_stack([np.full(len(s), first), s + 1, split[0] + 1, split[1] + 1]))
+            found.append(own.reshape(-1, 4, 4))
+        self.at = np.concatenate(at)
+        along, self.directions = np.linalg.eigh(np.concatenate(found))
+        self.along = np.maximum(along, 0.0)
+
+    def pulls(self, pull: FloatArray) -> FloatArray:
+        """Those of the leaves of every tree along their principal directions, (trees, 4), from those of the knots
+        (n, m)."""
+        found = []
+        for first, towards in enumerate((pull, pull.T)):
+            one, other = (_either_side(k) for k in towards.shape)
+            of_leaves = np.einsum("saj,tcj->satc", one @ towards, other)
+            s, *split = self.at[self.at[:, 0] == first, 1:].T - 1
+            found.append(np.stack([of_leaves[s, a, split[a]] for a in (0, 1)], axis=1).reshape(-1, 4))
+        return np.asarray((np.concatenate(found)[:, None] @ self.directions)[:, 0])
+
+    def evidence(self, pulls: FloatArray, size: FloatArray, noise: FloatArray | float = 1.0) -> FloatArray:
+        """Log marginal likelihood over none, (trees, b), for sizes (b,) of the leaves in ln T and noises (b,)."""
+        by_noise, drawn = np.broadcast_to(size**2 / noise, size.shape), np.broadcast_to(size**2 / noise**2, size.shape)
+        informed = 1.0 + by_noise * self.along[:, :, None]
+        explained = np.sum(pulls[:, :, None] ** 2 / informed, axis=1) * drawn
+        return np.asarray(0.5 * (explained - np.log(np.prod(informed, axis=1))))
+
+    def leaves(self, k: int) -> FloatArray:
+        """The four leaves of one tree over the knots, (n m, 4)."""
+        first, place, *places = self.at[k]
+        one, other = np.indices(self.sides)[:: 1 if first == 0 else -1]
+        side = (one >= place).astype(int)
+        return np.eye(4)[2 * side + (other >= np.array(places)[side])].reshape(-1, 4)
+
+
+def _either_side(knots: int) -> FloatArray:
+    """Of every split between knots those before it and those after it, (splits, 2, knots)."""
+    before = np.tri(knots)[:-1]
+    return np.stack([before, 1.0 - before], axis=1)
 
 
 @dataclass(frozen=True)

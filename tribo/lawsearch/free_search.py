@@ -1,10 +1,10 @@
 """Laws of no known form: the curve of one column and the surface of two that a campaign speaks for most.
 
 A surface is a Gaussian process over two columns, a course of each and what they do together (an analysis of variance in
-functions: Durrande, Ginsbourger and Roustant, J. Multivariate Anal. 115, 57, 2013), or a product of two curves, which
-has far fewer numbers. What a campaign says for one is its marginal likelihood, averaged over sizes, short lengths and
-long ones, less what the choice of the columns and of the scope costs; what chance gives the best of all is seen in
-campaigns that the model makes itself.
+functions: Durrande, Ginsbourger and Roustant, J. Multivariate Anal. 115, 57, 2013), or a product of two curves or a
+tree of steps, which have far fewer numbers. What a campaign says for one is its marginal likelihood, averaged over
+sizes, short lengths and long ones, less what the choice of the columns and of the scope costs; what chance gives the
+best of all is seen in campaigns that the model makes itself.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.lawsearch.free_curves import SIZES, at_knots, curve_of, kernels, knots_of, likeliest_products
+from tribo.lawsearch.free_curves import SIZES, Trees, at_knots, curve_of, kernels, knots_of, likeliest_products
 from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, WrittenLaw, scopes_of
 from tribo.lawsearch.scoring import Projection, effects_of, terms_of
 from tribo.mechanisms.record import Conditions
@@ -29,8 +29,9 @@ OF_SERIES = {"run_order", "specimen_run", "elapsed_s", "clock_h"}  # days, drift
 MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a meaning of their own come first
 NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.15])  # variance that a law leaves where it acts, of that before
 DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface
-PRODUCTS = 12  # surfaces of a campaign that are weighed as products of two curves as well
-NOISES_OF_PRODUCTS, SIZES_OF_PRODUCTS = NOISES[::2], SIZES[1::2]
+LOOKED_INTO = 12  # surfaces of a campaign that are weighed as products of two curves and as trees as well
+FEW_NOISES, FEW_SIZES = NOISES[::2], SIZES[1::2]  # of products and trees
+KEPT = 100  # surfaces whose trees are kept in memory
 OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts no more
 LEAST = 0.1  # of the square that is expected, in proportion to which a law leaves noise
 
@@ -60,6 +61,9 @@ class FreeSearch:
         beside = max(len(names) - 1, 1)
         self.cost = np.array([np.log(beside) if len(each) > 1 else 0.0 for each in columns])[:, None] + cost
         self.courses, self.sides = _principal_courses(c, columns)
+        shapes = {name: knots_of(name, c) for each in columns if len(each) > 1 for name in each}
+        self.at = {name: at_knots((shape,), c) for name, shape in shapes.items() if shape is not None}
+        self.trees = lru_cache(KEPT)(self._trees)
         self.projected = Projection(self.model, model.residual[None])
         effects = effects_of(scopes, c, terms_of(model))
         factor = self.projected.factor
@@ -80,15 +84,20 @@ class FreeSearch:
         self.not_absorbed = 2.0 - np.sum(absorbed**2, axis=(0, 2))
         self.not_absorbed_along = self.acts_on.sum(axis=1) - np.array(along)
 
-    def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
-        """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
-        principal directions (k,), and these directions (k, k) in its courses."""
+    def _absorbed(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What gives the information of courses in one scope: the squares (n,) of the whitened ``rows``, and the
+        columns (k, n) of what the model absorbs of them."""
         p, n = self.projected, self.projected.n
         border = np.einsum("in,inm->mn", rows, p.border.reshape(2, n, -1))
         specimens = int(p.specimen.max()) + 1
         own = np.zeros((specimens, p.own.shape[1], n))
         own[p.specimen, :, np.arange(n)] = np.einsum("in,ina->na", rows, p.own.reshape(2, n, -1))
-        absorbed, square = np.concatenate([border, own.reshape(-1, n)]), np.sum(rows**2, axis=0)
+        return np.sum(rows**2, axis=0), np.concatenate([border, own.reshape(-1, n)])
+
+    def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
+        """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
+        principal directions (k,), and these directions (k, k) in its courses."""
+        square, absorbed = self._absorbed(rows)
         there = square > 0
         absorbed, weight = absorbed[:, there], square[there, None]
 
@@ -99,6 +108,19 @@ class FreeSearch:
             return np.maximum(along, 0.0), directions
 
         return [[along_directions(course) for course in courses] for courses in self.courses]
+
+    def _trees(self, f: int, g: int) -> Trees:
+        """All trees of a surface in one scope."""
+        square, absorbed = self._absorbed(self.rows[g])
+        knots, sides = self._at_knots(f), tuple(self.at[name].shape[1] for name in self.columns[f])
+        taken = absorbed @ knots
+        information = knots.T @ (square[:, None] * knots) - taken.T @ taken
+        return Trees(information.reshape(*sides, *sides))
+
+    def _at_knots(self, f: int) -> FloatArray:
+        """The courses of a surface, each one at one of its knots, (n, knots)."""
+        one, other = (self.at[name] for name in self.columns[f])
+        return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -132,33 +154,35 @@ class FreeSearch:
         found -= self.cost
         surfaces = [f for f, each in enumerate(self.columns) if len(each) > 1]
         if surfaces:
-            self._weigh_products(found, surfaces, left, beyond, ratio)
+            self._look_into(found, surfaces, left, beyond, ratio)
         return found
 
-    def _weigh_products(
+    def _look_into(
         self, found: FloatArray, surfaces: Sequence[int], left: FloatArray, beyond: FloatArray, ratio: FloatArray
     ) -> None:
         """Of each campaign, average the evidence ``found`` of its likeliest surfaces with that of a product of two
-        curves; the other surfaces are taken to say nothing of a product.
+        curves and that of a tree; the other surfaces are taken to say nothing of either.
 
         Every two columns come with their likeliest scope first, so that none is left out for another one's scopes.
         """
-        order = np.argsort(-found[:, surfaces], axis=2)[:, :, :PRODUCTS]
+        order = np.argsort(-found[:, surfaces], axis=2)[:, :, :LOOKED_INTO]
         value = np.take_along_axis(found[:, surfaces], order, axis=2)
         rank = np.broadcast_to(np.arange(order.shape[2]), order.shape[1:])
-        found[:, surfaces] -= np.log(2.0)
+        found[:, surfaces] -= np.log(3.0)
         for r in range(len(found)):
-            first = np.lexsort((-value[r].ravel(), rank.ravel()))[:PRODUCTS]
+            first = np.lexsort((-value[r].ravel(), rank.ravel()))[:LOOKED_INTO]
             for s, g in zip(first // order.shape[2], order[r].ravel()[first], strict=True):
                 f = surfaces[s]
                 pull = np.einsum("in,in->n", self.rows[g], left[:, :, r]) / np.sqrt(beyond[g, r])
-                price = _price_of_noise(NOISES_OF_PRODUCTS, ratio[g, [r]], int(self.acts_on[g].sum()))
-                each = [
+                price = _price_of_noise(FEW_NOISES, ratio[g, [r]], int(self.acts_on[g].sum()))
+                products = [
                     _evidence_of_product(course.T @ pull, along, directions, self.sides[f], price)
                     for course, (along, directions) in zip(self.courses[f], self.spectra[g][f], strict=True)
                 ]
-                product = np.logaddexp.reduce(each) - np.log(2.0 * len(each)) - self.cost[f, g]
-                found[r, f, g] = np.logaddexp(found[r, f, g], product)
+                product = np.logaddexp.reduce(products) - np.log(len(products))
+                tree = _evidence_of_tree(self.trees(f, int(g)), self._at_knots(f).T @ pull, price)
+                further = np.logaddexp(product, tree) - np.log(3.0) - self.cost[f, g]
+                found[r, f, g] = np.logaddexp(found[r, f, g], further)
 
 
 def without_outliers(model: ModelFit) -> ModelFit:
@@ -204,10 +228,18 @@ def _evidence_of_product(
     k = math.prod(sides)
     information, pulls = np.zeros((k, k)), np.zeros(k)
     information[1:, 1:], pulls[1:] = (directions * along) @ directions.T, pull
-    noise = np.repeat(NOISES_OF_PRODUCTS, len(SIZES_OF_PRODUCTS))
-    sizes = np.tile(SIZES_OF_PRODUCTS, len(NOISES_OF_PRODUCTS))
+    noise = np.repeat(FEW_NOISES, len(FEW_SIZES))
+    sizes = np.tile(FEW_SIZES, len(FEW_NOISES))
     told = likeliest_products(information.reshape(*sides, *sides), pulls.reshape(sides), sizes, noise).evidence
-    return float(_at_likeliest_noise(told.reshape(len(NOISES_OF_PRODUCTS), -1, 1), price)[0])
+    return float(_at_likeliest_noise(told.reshape(len(FEW_NOISES), -1, 1), price)[0])
+
+
+def _evidence_of_tree(trees: Trees, pull: FloatArray, price: FloatArray) -> float:
+    """The same for a tree, averaged over all ``trees``, of the pulls (k,) of the knots."""
+    noise, sizes = np.repeat(FEW_NOISES, len(FEW_SIZES)), np.tile(FEW_SIZES, len(FEW_NOISES))
+    each = trees.evidence(trees.pulls(pull.reshape(trees.sides)), sizes, noise)
+    told = logsumexp(each, axis=0) - np.log(len(each))
+    return float(_at_likeliest_noise(told.reshape(len(FEW_NOISES), -1, 1), price)[0])
 
 
 def _principal_courses(
