@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 from blind.tribometer import Design
+from scipy.stats import multivariate_normal
 
 from tribo.diagnostics.contrasts import share_beyond
 from tribo.diagnostics.fit import ModelFit, whitened
 from tribo.diagnostics.model import Setup, log_forces
 from tribo.diagnostics.replicates import drawn_residuals, standardised
 from tribo.lawsearch import free_curves, free_search, model_choice, search
-from tribo.lawsearch.free_curves import fitted_curve, knots_of, likeliest_products
+from tribo.lawsearch.free_curves import Trees, fitted_curve, knots_of, likeliest_products
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes, likeliest, without_outliers
 from tribo.lawsearch.grammar import ADHESION_TERM, ALL, BOTH, T, WrittenLaw
 from tribo.lawsearch.model_choice import CLOSE, Background, Form, FoundLaw
@@ -49,7 +50,7 @@ def searched(model: ModelFit, columns: list[tuple[str, ...]]) -> FreeSearch:
 def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_search, "NOISES", np.ones(1))
     monkeypatch.setattr(free_search, "SIZES", np.full(1, SIZE))
-    monkeypatch.setattr(free_search, "PRODUCTS", 0)
+    monkeypatch.setattr(free_search, "LOOKED_INTO", 0)
     model, pair = campaign(1), ("temperature_C", "humidity_pct")
     search = searched(model, [pair])
     n = model.setup.observations.n
@@ -65,7 +66,8 @@ def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypa
     for k in range(n):
         white[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = model.factor[k]
     not_absorbed = np.linalg.inv(white).T @ rest @ np.linalg.inv(white)
-    noise = float(np.sum((not_absorbed @ (white @ z)) ** 2) / np.trace(not_absorbed))
+    left = not_absorbed @ (white @ z)
+    noise = float(np.sum(left**2) / np.trace(not_absorbed))
     for g, scope in enumerate(search.scopes):
         if (scope.acts_on, scope.where) != (T, ALL):
             continue
@@ -76,8 +78,17 @@ def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypa
             within = np.eye(course.shape[1]) + course.T @ rest @ course
             pull = course.T @ rest @ z
             likely.append(0.5 * (pull @ np.linalg.solve(within, pull) / noise - np.linalg.slogdet(within)[1]))
-        # short lengths and long ones, half of it: the other half is that of products, which say nothing here
-        expected = np.log(0.5 * np.mean(np.exp(likely)))
+        # the noise of both numbers of a test as it is, or that of one number in the direction in which the law acts
+        towards = np.zeros((2 * n, n))
+        for k in range(n):
+            moved = model.factor[k] @ regimes.astype(float)
+            towards[2 * k : 2 * k + 2, k] = moved / np.linalg.norm(moved)
+        covariance, along = towards.T @ not_absorbed @ towards, towards.T @ left
+        numbers = np.linalg.matrix_rank(covariance, tol=1e-6)
+        ratio = along @ np.linalg.pinv(covariance, rcond=1e-6) @ along / numbers / noise
+        unlikely = np.exp(-0.5 * numbers * (ratio - 1.0 - np.log(ratio)))
+        # short lengths and long ones, a third of it: the others are those of products and trees, which say nothing here
+        expected = np.log(np.mean([1.0, unlikely]) * np.mean(np.exp(likely)) / 3.0)
         found = search.measured[0, g] + search.cost[0, g]
         assert found == pytest.approx(expected, rel=1e-6)
 
@@ -97,6 +108,23 @@ def test_the_evidence_of_a_product_of_two_curves_is_its_marginal_likelihood_over
     assert found + np.log(2.0) == pytest.approx(expected, abs=0.25)
 
 
+def test_the_evidence_of_a_tree_is_the_marginal_likelihood_of_its_four_leaves_over_none() -> None:
+    rng, size, noise = np.random.default_rng(2), 0.4, 1.5
+    knots = np.zeros((60, 3, 4))
+    knots[np.arange(60), rng.integers(0, 3, 60), rng.integers(0, 4, 60)] = 1.0
+    courses, measured = knots.reshape(60, 12), np.sqrt(noise) * rng.normal(size=60)
+    trees = Trees((courses.T @ courses).reshape(3, 4, 3, 4))
+    pulls = trees.pulls((courses.T @ measured).reshape(3, 4))
+    found = trees.evidence(pulls, np.array([size]), np.array([noise]))[:, 0]
+    assert len(found) == 2 * 3**2 + 3 * 2**2  # the first split of either column, two of the other
+    for k in range(len(found)):
+        leaves = courses @ trees.leaves(k)
+        assert np.array_equal(leaves.sum(axis=1), np.ones(60))
+        alone, together = noise * np.eye(60), noise * np.eye(60) + size**2 * leaves @ leaves.T
+        likely = [multivariate_normal(cov=each).logpdf(measured) for each in (together, alone)]
+        assert found[k] == pytest.approx(likely[0] - likely[1], abs=1e-9)
+
+
 def product_of_two_curves(s: Setup) -> np.ndarray:
     """A wave and a half of the temperature times one of the humidity."""
     c = s.observations.conditions
@@ -113,32 +141,74 @@ def with_product() -> tuple[ModelFit, WrittenLaw]:
     return model, WrittenLaw(shapes)
 
 
-def test_a_product_of_two_curves_is_likelier_than_a_surface_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    model, _ = with_product()
+def tree(s: Setup) -> np.ndarray:
+    """Higher where it is warm and damp, and lower where it is cold and not quite dry."""
+    c = s.observations.conditions
+    warm = c.temperature_C > 23.4
+    damp = c.humidity_pct > np.where(warm, 52.0, 46.0)
+    return np.select([warm & damp, ~warm & damp], [0.2, -0.12], 0.0)[:, None] * np.ones(2)
+
+
+HIDDEN = {"products": product_of_two_curves, "trees": tree}
+
+
+@cache
+def with_surface(kind: str) -> tuple[ModelFit, WrittenLaw]:
+    """A campaign with a surface of a few numbers, and the law of all samples that has it."""
+    model = baseline(made(HIDDEN[kind], seed=5, design=Design(samples=("F", "A", "B", "Sx"), repeats=2)))
+    c = model.setup.observations.conditions
+    shapes = tuple(shape for name in ("temperature_C", "humidity_pct") if (shape := knots_of(name, c)) is not None)
+    return model, WrittenLaw(shapes)
+
+
+@pytest.mark.parametrize("kind", HIDDEN)
+def test_products_and_trees_are_likelier_than_surfaces_of_any_form(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model, _ = with_surface(kind)
     ((evidence, *_),) = likeliest(searched(model, [("temperature_C", "humidity_pct")]), 2)
-    monkeypatch.setattr(free_search, "PRODUCTS", 0)
+    monkeypatch.setattr(free_search, "LOOKED_INTO", 0)
     ((of_surface, *_),) = likeliest(searched(model, [("temperature_C", "humidity_pct")]), 2)
     assert evidence > of_surface + CLOSE
 
 
-def test_a_surface_that_is_a_product_lies_nearer_to_it_than_one_of_any_form(monkeypatch: pytest.MonkeyPatch) -> None:
-    model, law = with_product()
+@pytest.mark.parametrize("kind", HIDDEN)
+def test_a_surface_that_is_a_product_or_a_tree_lies_nearer_to_it_than_one_of_any_form(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, law = with_surface(kind)
     effects = np.ones((model.setup.observations.n, 2))
-    hidden = product_of_two_curves(model.setup)[:, 0]
+    hidden = HIDDEN[kind](model.setup)[:, 0]
 
     def off() -> float:
         curve = fitted_curve(model, (law, effects), 1.0)
         told = curve.columns[:, 0] @ curve.heights
         return float(np.sqrt(np.mean((told - hidden + hidden.mean() - told.mean()) ** 2)))
 
-    with_products = off()
-    of_products = free_curves._members_of_products
+    with_kind = off()
+    of_kind = getattr(free_curves, f"_members_of_{kind}")
 
     def unlikely(*given: Any) -> list[Any]:
-        return [replace(m, evidence=m.evidence - 100.0) for m in of_products(*given)]
+        return [replace(m, evidence=m.evidence - 100.0) for m in of_kind(*given)]
 
-    monkeypatch.setattr(free_curves, "_members_of_products", unlikely)
-    assert with_products < 0.8 * off()
+    monkeypatch.setattr(free_curves, f"_members_of_{kind}", unlikely)
+    assert with_kind < 0.8 * off()
+
+
+def sliding_alone(s: Setup) -> np.ndarray:
+    """A wave of the temperature, as large as the noise, in the sliding force alone."""
+    x = s.observations.conditions.temperature_C
+    return (0.08 * np.sin(3.0 * np.pi * (x - x.min()) / np.ptp(x)))[:, None] * np.array([0.0, 1.0])
+
+
+def test_a_law_of_the_sliding_force_is_judged_at_the_noise_that_it_leaves_in_the_sliding_force(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = baseline(made(sliding_alone, seed=5, design=Design(samples=("F", "A", "B", "Sx"), repeats=2)))
+    ((evidence, _, scope),) = likeliest(searched(model, [("temperature_C",)]), 1)
+    assert scope.regime == "sliding"
+    price = free_search._price_of_noise
+    monkeypatch.setattr(free_search, "_price_of_noise", lambda *given: price(*given)[:1])
+    ((at_noise_of_both, *_),) = likeliest(searched(model, [("temperature_C",)]), 1)
+    assert evidence > at_noise_of_both + CLOSE
 
 
 def test_a_law_of_one_sample_is_judged_at_the_noise_that_it_leaves_there() -> None:

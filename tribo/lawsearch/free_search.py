@@ -33,6 +33,7 @@ LOOKED_INTO = 12  # surfaces of a campaign that are weighed as products of two c
 FEW_NOISES, FEW_SIZES = NOISES[::2], SIZES[1::2]  # of products and trees
 KEPT = 100  # surfaces whose trees are kept in memory
 OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts no more
+WHOLLY = 1e-9  # of a number, what is left of it where the model absorbs it
 LEAST = 0.1  # of the square that is expected, in proportion to which a law leaves noise
 
 
@@ -77,12 +78,10 @@ class FreeSearch:
         # the direction of both numbers of a test in which a law moves them, (scopes, 2, n)
         size = np.linalg.norm(self.rows, axis=1, keepdims=True)
         self.towards = self.rows / np.where(size > 0.0, size, 1.0)
-        absorbed = np.concatenate([self.projected.own, self.projected.border], axis=1).reshape(2, len(c.sample), -1)
-        along = [np.sum(np.einsum("in,inm->nm", towards, absorbed) ** 2) for towards in self.towards]
-        # expected square of what the model does not absorb, of both numbers of every test (n,), in that direction of
-        # all tests that a law moves (scopes,)
-        self.not_absorbed = 2.0 - np.sum(absorbed**2, axis=(0, 2))
-        self.not_absorbed_along = self.acts_on.sum(axis=1) - np.array(along)
+        p = self.projected
+        # expected square of what the model does not absorb of both numbers of every test, (n,)
+        self.not_absorbed = (1.0 - np.sum(p.own**2, axis=1) - np.sum(p.border**2, axis=1)).reshape(2, -1).sum(axis=0)
+        self.along = [self._along(towards) for towards in self.towards]
 
     def _absorbed(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What gives the information of courses in one scope: the squares (n,) of the whitened ``rows``, and the
@@ -93,6 +92,15 @@ class FreeSearch:
         own = np.zeros((specimens, p.own.shape[1], n))
         own[p.specimen, :, np.arange(n)] = np.einsum("in,ina->na", rows, p.own.reshape(2, n, -1))
         return np.sum(rows**2, axis=0), np.concatenate([border, own.reshape(-1, n)])
+
+    def _along(self, towards: FloatArray) -> tuple[FloatArray, float]:
+        """Of the numbers of all tests that a scope moves, in the direction in which it does: the inverse of their
+        covariance once the model has absorbed its part, and how many are left."""
+        square, absorbed = self._absorbed(towards)
+        absorbed = absorbed[:, square > 0.0]
+        left = np.eye(absorbed.shape[1]) - absorbed.T @ absorbed
+        inverse = np.asarray(np.linalg.inv(left + WHOLLY * np.eye(len(left))), float)
+        return inverse, float(np.sum(left * inverse))
 
     def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
@@ -139,12 +147,15 @@ class FreeSearch:
         left = projected.left.reshape(2, projected.n, -1)
         squares = self.acts_on @ np.sum(left**2, axis=0)
         beyond = np.maximum(squares / (self.acts_on @ self.not_absorbed)[:, None], LEAST)
-        squares = np.array([np.sum(np.einsum("in,inr->nr", towards, left) ** 2, axis=0) for towards in self.towards])
-        ratio = np.maximum(squares / self.not_absorbed_along[:, None], LEAST) / beyond
+        ratio = np.empty(beyond.shape)
+        for g, (towards, (inverse, numbers)) in enumerate(zip(self.towards, self.along, strict=True)):
+            along = np.einsum("in,inr->nr", towards, left)[self.acts_on[g]]
+            squares = np.sum(along * (inverse @ along), axis=0)
+            ratio[g] = np.maximum(squares / numbers, LEAST) / beyond[g]
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
         for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
             pull = np.einsum("in,inr->nr", rows, left)
-            price = _price_of_noise(NOISES, ratio[g], int(self.acts_on[g].sum()))
+            price = _price_of_noise(NOISES, ratio[g], self._numbers(g))
             for f, (courses, short_and_long) in enumerate(zip(self.courses, spectra, strict=True)):
                 each = [
                     _evidence(along, (directions.T @ (course.T @ pull)) ** 2 / beyond[g], price)
@@ -156,6 +167,10 @@ class FreeSearch:
         if surfaces:
             self._look_into(found, surfaces, left, beyond, ratio)
         return found
+
+    def _numbers(self, g: int) -> tuple[float, float]:
+        """How many numbers tell of the noise that a law leaves: both of all tests that it moves, and one of each."""
+        return 2.0 * float(self.acts_on[g].sum()), self.along[g][1]
 
     def _look_into(
         self, found: FloatArray, surfaces: Sequence[int], left: FloatArray, beyond: FloatArray, ratio: FloatArray
@@ -174,7 +189,7 @@ class FreeSearch:
             for s, g in zip(first // order.shape[2], order[r].ravel()[first], strict=True):
                 f = surfaces[s]
                 pull = np.einsum("in,in->n", self.rows[g], left[:, :, r]) / np.sqrt(beyond[g, r])
-                price = _price_of_noise(FEW_NOISES, ratio[g, [r]], int(self.acts_on[g].sum()))
+                price = _price_of_noise(FEW_NOISES, ratio[g, [r]], self._numbers(int(g)))
                 products = [
                     _evidence_of_product(course.T @ pull, along, directions, self.sides[f], price)
                     for course, (along, directions) in zip(self.courses[f], self.spectra[g][f], strict=True)
@@ -196,11 +211,11 @@ def without_outliers(model: ModelFit) -> ModelFit:
     return replace(model, weight=np.ones(len(near)), residual=residual)
 
 
-def _price_of_noise(noises: FloatArray, ratio: FloatArray, moved: int) -> FloatArray:
-    """What it costs in log likelihood that a law leaves so much noise, (2, noises, r): of both numbers of the ``moved``
-    tests, and of one number of each, whose noise without the law is ``ratio`` (r,) of that of both."""
+def _price_of_noise(noises: FloatArray, ratio: FloatArray, numbers: tuple[float, float]) -> FloatArray:
+    """What it costs in log likelihood that a law leaves so much noise, (2, noises, r): in both numbers of the tests,
+    and in one of each, whose noise without the law is ``ratio`` (r,) of that of both."""
     share = np.stack([np.ones(len(ratio)), ratio])[:, None, :] / noises[:, None]
-    return np.asarray(0.5 * moved * np.array([2.0, 1.0])[:, None, None] * (share - 1.0 - np.log(share)))
+    return np.asarray(0.5 * np.array(numbers)[:, None, None] * (share - 1.0 - np.log(share)))
 
 
 def _evidence(along: FloatArray, pulls: FloatArray, price: FloatArray) -> FloatArray:
