@@ -33,7 +33,7 @@ LOOKED_INTO = 12  # surfaces of a campaign that are weighed as products of two c
 FEW_NOISES, FEW_SIZES = NOISES[::2], SIZES[1::2]  # of products and trees
 KEPT = 100  # surfaces whose trees are kept in memory
 OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts no more
-WHOLLY = 1e-9  # of a number, what is left of it where the model absorbs it
+WHOLLY = 1e-6  # of a number, what is left of it where the model absorbs it
 LEAST = 0.1  # of the square that is expected, in proportion to which a law leaves noise
 
 
