@@ -231,7 +231,8 @@ def _evidence(along: FloatArray, pulls: FloatArray, price: FloatArray) -> FloatA
 
 def _at_likeliest_noise(each: FloatArray, price: FloatArray) -> FloatArray:
     """Of log likelihoods (noises, sizes, r) the mean over sizes at the likeliest noise, (r,)."""
-    mean = logsumexp(each, axis=1) - np.log(each.shape[1])
+    best = each.max(axis=1, keepdims=True)
+    mean = best[:, 0] + np.log(np.mean(np.exp(each - best), axis=1))
     return np.asarray(np.logaddexp.reduce((mean - price).max(axis=1)) - np.log(len(price)))
 
 
