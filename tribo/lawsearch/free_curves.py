@@ -19,6 +19,7 @@ from itertools import product
 import numpy as np
 from scipy.special import logsumexp, softmax
 
+from tribo.diagnostics.contrasts import FORM
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.gaps import enough_recorded
 from tribo.diagnostics.inference import gain_on_groups
@@ -39,7 +40,7 @@ KNOTS = 25
 ALONG = 13  # knots of a surface along each column
 LENGTHS = (0.07, 0.15, 0.3, 0.6)  # over which a curve changes, in shares of the range of the column
 SIZES = np.geomspace(0.005, 0.5, 9)  # standard deviation of a curve, in ln T
-TREES = 60  # of one size, the likeliest ones, of which a surface is told
+TREES = 15  # the likeliest ones, of which a surface is told
 STARTS, TURNS, TINY = 2, 8, 1e-9  # of the fit of a product of two curves: from where, how often each, a length above 0
 FLAT_BELOW = 1e-7  # of the largest variance of a curve along its principal directions, below which one is left out
 FOLDS = 5  # of whole specimens that are left out
@@ -213,18 +214,19 @@ def _members_of_products(
 def _members_of_trees(
     shapes: Sequence[Shape], information: FloatArray, pull: FloatArray, informed: float
 ) -> list[_Member]:
-    """The likeliest trees of each size of the surfaces; together they count as much as all trees of these sizes."""
+    """The likeliest trees, each with a surface beside it by which it may be wrong in form; together they count as much
+    as all trees."""
     sides = tuple(len(shape.values) for shape in shapes)
     trees, sizes = Trees(information.reshape(*sides, *sides)), SIZES[2::2]
-    pulls = trees.pulls(pull.reshape(sides))
-    every = trees.evidence(pulls, sizes)
-    found = []
-    for size, each in zip(sizes, every.T, strict=True):
-        for k in np.argsort(-each)[:TREES]:
-            told = size**2 / (1.0 + informed * size**2 * trees.along[k])
-            along = trees.leaves(int(k)) @ trees.directions[k]
-            found.append(_Member(float(each[k]), along @ (informed * told * pulls[k]), (along * told) @ along.T))
-    lost = float(logsumexp(every) - np.log(every.size)) - _mean_evidence(found)
+    every = trees.evidence(trees.pulls(pull.reshape(sides)), sizes)
+    wrong = FORM * _root(np.mean(likely(shapes), axis=0))
+    found, plain = [], []
+    for k in np.argsort(-every.max(axis=1))[:TREES]:
+        for size, evidence in zip(sizes, every[k], strict=True):
+            root = size * np.concatenate([trees.leaves(int(k)), wrong], axis=1)
+            found.append(_member(information, pull, root, informed))
+            plain.append(evidence)
+    lost = float(logsumexp(every) - np.log(every.size) - logsumexp(plain) + np.log(len(plain)))
     return [replace(m, evidence=m.evidence + lost) for m in found]
 
 

@@ -100,7 +100,7 @@ class FreeSearch:
         absorbed = absorbed[:, square > 0.0]
         left = np.eye(absorbed.shape[1]) - absorbed.T @ absorbed
         inverse = np.asarray(np.linalg.inv(left + WHOLLY * np.eye(len(left))), float)
-        return inverse, float(np.sum(left * inverse))
+        return inverse, max(float(np.sum(left * inverse)), WHOLLY)
 
     def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
