@@ -229,7 +229,7 @@ def levels_held(row: Row) -> list[bool]:
     """
     truth = {float_or(name): 100 * np.expm1(x) for name, x in row["truth"]["levels"]}
     for layer in row["layers"]:
-        if layer.get("levels") and named_column(row) in layer["name"]:
+        if layer.get("levels") and of_column(layer, row):
             told = {float_or(name): x for name, x in layer["levels"].items()}
             return [bool(told[n][0] <= t <= told[n][2]) for n, t in truth.items() if n in told]
     return [low <= true <= high for _, _, true, low, high in row.get("at_levels", ())]
@@ -247,6 +247,11 @@ def named_column(row: Row) -> str:
 
 
 CAUSES_OF = {"velocity_dependence": "speed_mm_s", "contact_ageing": "hold_s"}
+
+
+def of_column(layer: Row, row: Row) -> bool:
+    """Whether a layer follows the hidden column, by its name or by the mechanism that it is."""
+    return named_column(row) in layer["name"] or CAUSES_OF.get(layer["name"]) == row["truth"]["column"]
 
 
 def column_named(row: Row) -> bool:
@@ -270,7 +275,7 @@ def shape_listed(row: Row) -> bool:
     """
     if not column_named(row):
         return False
-    own = [x for x in row["layers"] if named_column(row) in x["name"]]
+    own = [x for x in row["layers"] if of_column(x, row)]
     if any(x.get("levels") for x in own):
         return True
     words = WRITTEN[row["truth"]["shape"]]
@@ -385,10 +390,19 @@ def disturbed_lines(rows: list[Row]) -> list[Line]:
             lines += [
                 (f"laws, nuisance {under}: columns right, of those the observer finds", "90 %",
                  share(clear, columns_right)),
+                *beside_none(rows, clear, under),
                 ("the same: another physical column", "", share(hidden_laws, other_physical)),
                 ("the same: 90 % band holds the change, mean share of tests", "85 to 95 %", mean_band(hidden_laws)),
             ]  # fmt: skip
     return lines
+
+
+def beside_none(rows: list[Row], clear: list[Row], under: str) -> list[Line]:
+    """Under nuisance: the campaigns whose columns are right where the same law is hidden without any."""
+    right = {r["seed"] for r in of(rows, "laws, none") if columns_right(r)}
+    both = [r for r in clear if r["seed"] in right]
+    label = "the same: of those whose columns are right without nuisance"
+    return [(label, "", share(both, columns_right))] if under != "none" and both else []
 
 
 def mean_band(rows: list[Row]) -> str:
