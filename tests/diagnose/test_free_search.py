@@ -247,7 +247,7 @@ def test_a_curve_from_which_the_fit_gains_nothing_is_no_law(monkeypatch: pytest.
     monkeypatch.setattr(search, "_law_of_a_formula", lambda *given: None)
 
     def found() -> tuple[FoundLaw, ...]:
-        return search.discover_laws(model, level=0.003, rng=np.random.default_rng(1)).laws
+        return search.discover_laws(model, level=0.003, replicates=20, rng=np.random.default_rng(1)).laws
 
     assert [law.law.columns for law in found()] == [("humidity_pct",)]
     chosen = search.choose_free
