@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -64,7 +64,7 @@ class FreeSearch:
         self.courses, self.sides = _principal_courses(c, columns)
         shapes = {name: knots_of(name, c) for each in columns if len(each) > 1 for name in each}
         self.at = {name: at_knots((shape,), c) for name, shape in shapes.items() if shape is not None}
-        self.trees = lru_cache(KEPT)(self._trees)
+        self.trees: dict[tuple[int, int], Trees] = {}
         self.projected = Projection(self.model, model.residual[None])
         effects = effects_of(scopes, c, terms_of(model))
         factor = self.projected.factor
@@ -119,11 +119,15 @@ class FreeSearch:
 
     def _trees(self, f: int, g: int) -> Trees:
         """All trees of a surface in one scope."""
+        if (f, g) in self.trees:
+            return self.trees[f, g]
         square, absorbed = self._absorbed(self.rows[g])
         knots, sides = self._at_knots(f), tuple(self.at[name].shape[1] for name in self.columns[f])
         taken = absorbed @ knots
         information = knots.T @ (square[:, None] * knots) - taken.T @ taken
-        return Trees(information.reshape(*sides, *sides))
+        if len(self.trees) == KEPT:
+            self.trees.pop(next(iter(self.trees)))
+        return self.trees.setdefault((f, g), Trees(information.reshape(*sides, *sides)))
 
     def _at_knots(self, f: int) -> FloatArray:
         """The courses of a surface, each one at one of its knots, (n, knots)."""
@@ -195,7 +199,7 @@ class FreeSearch:
                     for course, (along, directions) in zip(self.courses[f], self.spectra[g][f], strict=True)
                 ]
                 product = np.logaddexp.reduce(products) - np.log(len(products))
-                tree = _evidence_of_tree(self.trees(f, int(g)), self._at_knots(f).T @ pull, price)
+                tree = _evidence_of_tree(self._trees(f, int(g)), self._at_knots(f).T @ pull, price)
                 further = np.logaddexp(product, tree) - np.log(3.0) - self.cost[f, g]
                 found[r, f, g] = np.logaddexp(found[r, f, g], further)
 
