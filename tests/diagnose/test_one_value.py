@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from laboratories.campaign import make, multiply
+from laboratories.campaign import both, make, multiply
 from laboratories.handed_over import handed_over
 from laboratories.laboratory import Laboratory, day_of
 from laboratories.one_value import hide_one_value
@@ -15,7 +15,7 @@ from mechanisms.test_contract import base, conditions
 from support import first_quick
 
 from tribo.diagnostics import examine
-from tribo.diagnostics.candidates import _more_than_days_differ, judged, refitted
+from tribo.diagnostics.candidates import _more_than_groups_differ, judged, refitted
 from tribo.diagnostics.fit import fit
 from tribo.diagnostics.model import candidates, setup
 from tribo.diagnostics.observations import observe
@@ -72,7 +72,25 @@ def test_a_day_that_differs_by_a_factor_has_no_wrong_tare(hidden: str, more: boo
     acting = next(a for a in known if a.name == "tare_of_one_day" and a.choice.endswith(day[here][0]))
     tare = judged(start, refitted(start, (acting,)), 0.0)
     assert tare.gain > 3.0
-    assert _more_than_days_differ(start, tare) == more
+    assert _more_than_groups_differ(start, tare) == more
+
+
+@pytest.mark.parametrize(("hidden", "more"), [("factor", False), ("area", True)])
+def test_a_specimen_that_lies_far_out_has_no_other_area(hidden: str, more: bool) -> None:
+    """Another area explains something of a factor too. It is a cause where it explains more than a factor does."""
+    bench = make(3, PATTERNS_OFF).bench
+    here = bench.column("specimen") == "F2"
+    if hidden == "factor":
+        multiply(bench, np.outer(here, [-0.2, -0.25]))
+    else:
+        multiply(bench, np.log1p(-0.5 * here[:, None] * bench.adhesion_N() / both(bench)))
+    o = observe(handed_over(bench, 3))
+    start = fit(setup(o, tabled_predictor(o.patterns)))
+    known = candidates(start.setup, start.law)
+    acting = next(a for a in known if a.name == "area_of_one_specimen" and a.choice == "F2")
+    area = judged(start, refitted(start, (acting,)), 0.0)
+    assert area.gain > 3.0
+    assert _more_than_groups_differ(start, area) == more
 
 
 def test_the_remedy_says_which_weight_to_weigh() -> None:

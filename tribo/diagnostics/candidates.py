@@ -86,7 +86,7 @@ def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[CauseCand
         for c in tried.values()
     ]
     possible = [c for c in fitted if c.gain <= hopeful or not _adhesion_turns_negative(start.model, c)]
-    standing = [c for c in possible if c.gain <= hopeful or _more_than_days_differ(start.model, c)]
+    standing = [c for c in possible if c.gain <= hopeful or _more_than_groups_differ(start.model, c)]
     return sorted(standing, key=lambda c: -c.gain)
 
 
@@ -97,16 +97,20 @@ def _adhesion_turns_negative(start: ModelFit, c: CauseCandidate) -> bool:
     return bool(np.any(c.fit.law[ADHESION] < np.minimum(start.law[ADHESION], 0.0) - BELOW_ZERO * sd))
 
 
-def _more_than_days_differ(start: ModelFit, c: CauseCandidate) -> bool:
-    """Whether a cause of whole sessions is likely beside a factor of any size on these in each regime.
+def _more_than_groups_differ(start: ModelFit, c: CauseCandidate) -> bool:
+    """Whether a cause of whole sessions, or of one specimen, is likely beside a factor of any size on these in each
+    regime.
 
-    One day may differ from the others by far more than is usual, and a physical cause of one day has to show more than
-    that: another course in the load and the samples. A recorded column claims no more than that it differs.
+    One day or one specimen may differ from the others by far more than is usual, and a physical cause of it has to show
+    more than that: another course in the load and the samples. A recorded column claims no more than that it differs,
+    and a label that is wrong says by how much.
     """
-    s = c.fit.setup
+    s, m = c.fit.setup, c.acting.mechanism
     here = np.any(np.abs(effect_of(s, c.fit.law, c.acting, c.values)) > NO_CHANGE, axis=1)
-    session = session_of(s.observations.conditions)
-    if c.acting.mechanism.any_column or here.all() or np.isin(session[~here], session[here]).any():
+    session, specimen = session_of(s.observations.conditions), s.specimen
+    of_sessions = not np.isin(session[~here], session[here]).any()
+    of_one_specimen = len(np.unique(specimen[here])) == 1 and m.choosing.all_or_nothing_sd is None
+    if m.any_column or here.all() or not (of_sessions or of_one_specimen):
         return True
     apart = s.with_effects(here[:, None, None] * np.eye(2), np.full(2, ANY_FACTOR))
     differs = fit(apart, start.acting, start=start)
