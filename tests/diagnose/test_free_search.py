@@ -90,7 +90,7 @@ def test_the_evidence_is_the_marginal_likelihood_of_a_surface_over_none(monkeypa
         # short lengths and long ones, a third of it: the others are those of products and trees, which say nothing here
         expected = np.log(np.mean([1.0, unlikely]) * np.mean(np.exp(likely)) / 3.0)
         found = search.measured[0, g] + search.cost[0, g]
-        assert found == pytest.approx(expected, abs=1e-3)
+        assert found == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_evidence_of_a_product_of_two_curves_is_its_marginal_likelihood_over_none() -> None:
@@ -132,15 +132,6 @@ def product_of_two_curves(s: Setup) -> np.ndarray:
     return 0.1 * (along[0] * along[1])[:, None] * np.ones(2)
 
 
-@cache
-def with_product() -> tuple[ModelFit, WrittenLaw]:
-    """A campaign with a product of two curves, and the surface on all samples that has it."""
-    model = baseline(made(product_of_two_curves, seed=5, design=Design(samples=("F", "A", "B", "Sx"), repeats=2)))
-    c = model.setup.observations.conditions
-    shapes = tuple(shape for name in ("temperature_C", "humidity_pct") if (shape := knots_of(name, c)) is not None)
-    return model, WrittenLaw(shapes)
-
-
 def tree(s: Setup) -> np.ndarray:
     """Higher where it is warm and damp, and lower where it is cold and not quite dry."""
     c = s.observations.conditions
@@ -170,10 +161,11 @@ def test_products_and_trees_are_likelier_than_surfaces_of_any_form(kind: str, mo
     assert evidence > of_surface + CLOSE
 
 
-@pytest.mark.parametrize("kind", HIDDEN)
+@pytest.mark.parametrize(("kind", "nearer"), [("products", 0.8), ("trees", 0.9)])
 def test_a_surface_that_is_a_product_or_a_tree_lies_nearer_to_it_than_one_of_any_form(
-    kind: str, monkeypatch: pytest.MonkeyPatch
+    kind: str, nearer: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Steps lie between the knots of a surface, so that a tree gains less."""
     model, law = with_surface(kind)
     effects = np.ones((model.setup.observations.n, 2))
     hidden = HIDDEN[kind](model.setup)[:, 0]
@@ -190,7 +182,7 @@ def test_a_surface_that_is_a_product_or_a_tree_lies_nearer_to_it_than_one_of_any
         return [replace(m, evidence=m.evidence - 100.0) for m in of_kind(*given)]
 
     monkeypatch.setattr(free_curves, f"_members_of_{kind}", unlikely)
-    assert with_kind < 0.9 * off()
+    assert with_kind < nearer * off()
 
 
 def sliding_alone(s: Setup) -> np.ndarray:

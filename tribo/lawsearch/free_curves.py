@@ -111,8 +111,13 @@ def at_knots(shapes: Sequence[Shape], c: Conditions) -> FloatArray:
     """The courses (n, knots) that a curve or a surface is made of, each one at its knot and zero at the others."""
     first, *second = (replace(shape, kind="surface", heights=()).of(c) for shape in shapes)
     for other in second:
-        first = (first[:, :, None] * other[:, None, :]).reshape(len(first), -1)
+        first = each_with_each(first, other)
     return first
+
+
+def each_with_each(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The products of every course (n, k) with every other one (n, m), (n, k m)."""
+    return np.asarray((first[:, :, None] * second[:, None, :]).reshape(len(first), -1))
 
 
 def likely(shapes: Sequence[Shape]) -> list[FloatArray]:

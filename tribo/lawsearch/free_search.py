@@ -19,7 +19,16 @@ import numpy as np
 from scipy.special import logsumexp
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.lawsearch.free_curves import SIZES, Trees, at_knots, curve_of, kernels, knots_of, likeliest_products
+from tribo.lawsearch.free_curves import (
+    SIZES,
+    Trees,
+    at_knots,
+    curve_of,
+    each_with_each,
+    kernels,
+    knots_of,
+    likeliest_products,
+)
 from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, WrittenLaw, scopes_of
 from tribo.lawsearch.scoring import Projection, effects_of, terms_of
 from tribo.mechanisms.record import Conditions
@@ -31,9 +40,10 @@ NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.15])  # variance that a la
 DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface
 LOOKED_INTO = 12  # surfaces of a campaign that are weighed as products of two curves and as trees as well
 FEW_NOISES, FEW_SIZES = NOISES[::2], SIZES[1::2]  # of products and trees
+OF_FEW = np.tile(FEW_SIZES, len(FEW_NOISES)), np.repeat(FEW_NOISES, len(FEW_SIZES))  # every size at every noise
 KEPT = 100  # surfaces whose trees are kept in memory
 OUTLIER = 0.3  # weight of a test about five standard deviations off, beyond which it counts no more
-WHOLLY = 1e-6  # of a number, what is left of it where the model absorbs it
+WHOLLY = 1e-6  # of the variance of a number, what is left at most where the model absorbs it
 LEAST = 0.1  # of the square that is expected, in proportion to which a law leaves noise
 
 
@@ -69,70 +79,56 @@ class FreeSearch:
         effects = effects_of(scopes, c, terms_of(model))
         factor = self.projected.factor
         # of every scope, what multiplies a course in the whitened rows, static and sliding (scopes, 2, n)
-        self.rows = np.stack(
+        rows = np.stack(
             [factor[:, 0, 0] * effects[:, :, 0],
              factor[:, 1, 0] * effects[:, :, 0] + factor[:, 1, 1] * effects[:, :, 1]], axis=1,
         )  # fmt: skip
-        self.spectra = [self._spectra(rows) for rows in self.rows]
-        self.acts_on = np.any(self.rows != 0.0, axis=1)  # which tests, (scopes, n)
-        # the direction of both numbers of a test in which a law moves them, (scopes, 2, n)
-        size = np.linalg.norm(self.rows, axis=1, keepdims=True)
-        self.towards = self.rows / np.where(size > 0.0, size, 1.0)
+        # the direction of both numbers of a test in which a law moves them, and by how much a course does (scopes, n)
+        self.size = np.linalg.norm(rows, axis=1)
+        self.moved = self.size > 0.0
+        self.towards = rows / np.where(self.moved, self.size, 1.0)[:, None]
         p = self.projected
         # expected square of what the model does not absorb of both numbers of every test, (n,)
         self.not_absorbed = (1.0 - np.sum(p.own**2, axis=1) - np.sum(p.border**2, axis=1)).reshape(2, -1).sum(axis=0)
-        self.along = [self._along(towards) for towards in self.towards]
+        self.absorbed = [self._absorbed(g) for g in range(len(scopes))]
+        self.left_along = [_whitening(absorbed) for absorbed in self.absorbed]
+        self.spectra = [self._spectra(g) for g in range(len(scopes))]
 
-    def _absorbed(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What gives the information of courses in one scope: the squares (n,) of the whitened ``rows``, and the
-        columns (k, n) of what the model absorbs of them."""
+    def _absorbed(self, g: int) -> FloatArray:
+        """Of the tests that a scope moves, along the direction in which it does, the columns (k, tests) of what the
+        model absorbs."""
         p, n = self.projected, self.projected.n
-        border = np.einsum("in,inm->mn", rows, p.border.reshape(2, n, -1))
+        border = np.einsum("in,inm->mn", self.towards[g], p.border.reshape(2, n, -1))
         specimens = int(p.specimen.max()) + 1
         own = np.zeros((specimens, p.own.shape[1], n))
-        own[p.specimen, :, np.arange(n)] = np.einsum("in,ina->na", rows, p.own.reshape(2, n, -1))
-        return np.sum(rows**2, axis=0), np.concatenate([border, own.reshape(-1, n)])
+        own[p.specimen, :, np.arange(n)] = np.einsum("in,ina->na", self.towards[g], p.own.reshape(2, n, -1))
+        return np.concatenate([border, own.reshape(-1, n)])[:, self.moved[g]]
 
-    def _along(self, towards: FloatArray) -> tuple[FloatArray, float]:
-        """Of the numbers of all tests that a scope moves, in the direction in which it does: the inverse of their
-        covariance once the model has absorbed its part, and how many are left."""
-        square, absorbed = self._absorbed(towards)
-        absorbed = absorbed[:, square > 0.0]
-        left = np.eye(absorbed.shape[1]) - absorbed.T @ absorbed
-        inverse = np.asarray(np.linalg.inv(left + WHOLLY * np.eye(len(left))), float)
-        return inverse, max(float(np.sum(left * inverse)), WHOLLY)
+    def _information(self, g: int, courses: FloatArray) -> FloatArray:
+        """That of courses (n, k) in one scope, (k, k)."""
+        here = (self.size[g][:, None] * courses)[self.moved[g]]
+        taken = self.absorbed[g] @ here
+        return np.asarray(here.T @ here - taken.T @ taken)
 
-    def _spectra(self, rows: FloatArray) -> list[list[tuple[FloatArray, FloatArray]]]:
+    def _spectra(self, g: int) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Of each curve and surface in one scope, of short lengths and of long ones, the information along its
         principal directions (k,), and these directions (k, k) in its courses."""
-        square, absorbed = self._absorbed(rows)
-        there = square > 0
-        absorbed, weight = absorbed[:, there], square[there, None]
 
         def along_directions(course: FloatArray) -> tuple[FloatArray, FloatArray]:
-            here = course[there]
-            taken = absorbed @ here
-            along, directions = np.linalg.eigh(here.T @ (weight * here) - taken.T @ taken)
+            along, directions = np.linalg.eigh(self._information(g, course))
             return np.maximum(along, 0.0), directions
 
         return [[along_directions(course) for course in courses] for courses in self.courses]
 
     def _trees(self, f: int, g: int) -> Trees:
         """All trees of a surface in one scope."""
-        if (f, g) in self.trees:
-            return self.trees[f, g]
-        square, absorbed = self._absorbed(self.rows[g])
-        knots, sides = self._at_knots(f), tuple(self.at[name].shape[1] for name in self.columns[f])
-        taken = absorbed @ knots
-        information = knots.T @ (square[:, None] * knots) - taken.T @ taken
-        if len(self.trees) == KEPT:
-            self.trees.pop(next(iter(self.trees)))
-        return self.trees.setdefault((f, g), Trees(information.reshape(*sides, *sides)))
-
-    def _at_knots(self, f: int) -> FloatArray:
-        """The courses of a surface, each one at one of its knots, (n, knots)."""
-        one, other = (self.at[name] for name in self.columns[f])
-        return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
+        if (f, g) not in self.trees:
+            one, other = (self.at[name] for name in self.columns[f])
+            sides = one.shape[1], other.shape[1]
+            if len(self.trees) == KEPT:
+                self.trees.pop(next(iter(self.trees)))
+            self.trees[f, g] = Trees(self._information(g, each_with_each(one, other)).reshape(*sides, *sides))
+        return self.trees[f, g]
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -149,17 +145,14 @@ class FreeSearch:
         """
         projected = Projection(self.model, residual)
         left = projected.left.reshape(2, projected.n, -1)
-        squares = self.acts_on @ np.sum(left**2, axis=0)
-        beyond = np.maximum(squares / (self.acts_on @ self.not_absorbed)[:, None], LEAST)
+        beyond = np.maximum(self.moved @ np.sum(left**2, axis=0) / (self.moved @ self.not_absorbed)[:, None], LEAST)
         ratio = np.empty(beyond.shape)
-        for g, (towards, (inverse, numbers)) in enumerate(zip(self.towards, self.along, strict=True)):
-            along = np.einsum("in,inr->nr", towards, left)[self.acts_on[g]]
-            squares = np.sum(along * (inverse @ along), axis=0)
-            ratio[g] = np.maximum(squares / numbers, LEAST) / beyond[g]
         found = np.empty((left.shape[2], len(self.columns), len(self.scopes)))
-        for g, (rows, spectra) in enumerate(zip(self.rows, self.spectra, strict=True)):
-            pull = np.einsum("in,inr->nr", rows, left)
-            price = _price_of_noise(NOISES, ratio[g], self._numbers(g))
+        for g, spectra in enumerate(self.spectra):
+            along = np.einsum("in,inr->nr", self.towards[g], left)
+            mean = np.mean((self.left_along[g] @ along[self.moved[g]]) ** 2, axis=0)
+            ratio[g] = np.maximum(mean, LEAST) / beyond[g]
+            pull, price = self.size[g][:, None] * along, _price_of_noise(NOISES, ratio[g], self._numbers(g))
             for f, (courses, short_and_long) in enumerate(zip(self.courses, spectra, strict=True)):
                 each = [
                     _evidence(along, (directions.T @ (course.T @ pull)) ** 2 / beyond[g], price)
@@ -174,7 +167,7 @@ class FreeSearch:
 
     def _numbers(self, g: int) -> tuple[float, float]:
         """How many numbers tell of the noise that a law leaves: both of all tests that it moves, and one of each."""
-        return 2.0 * float(self.acts_on[g].sum()), self.along[g][1]
+        return 2.0 * float(self.moved[g].sum()), float(len(self.left_along[g]))
 
     def _look_into(
         self, found: FloatArray, surfaces: Sequence[int], left: FloatArray, beyond: FloatArray, ratio: FloatArray
@@ -192,16 +185,26 @@ class FreeSearch:
             first = np.lexsort((-value[r].ravel(), rank.ravel()))[:LOOKED_INTO]
             for s, g in zip(first // order.shape[2], order[r].ravel()[first], strict=True):
                 f = surfaces[s]
-                pull = np.einsum("in,in->n", self.rows[g], left[:, :, r]) / np.sqrt(beyond[g, r])
+                along = np.einsum("in,in->n", self.towards[g], left[:, :, r])
+                pull = self.size[g] * along / np.sqrt(beyond[g, r])
                 price = _price_of_noise(FEW_NOISES, ratio[g, [r]], self._numbers(int(g)))
                 products = [
                     _evidence_of_product(course.T @ pull, along, directions, self.sides[f], price)
                     for course, (along, directions) in zip(self.courses[f], self.spectra[g][f], strict=True)
                 ]
                 product = np.logaddexp.reduce(products) - np.log(len(products))
-                tree = _evidence_of_tree(self._trees(f, int(g)), self._at_knots(f).T @ pull, price)
+                one, other = (self.at[name] for name in self.columns[f])
+                tree = _evidence_of_tree(self._trees(f, int(g)), one.T @ (pull[:, None] * other), price)
                 further = np.logaddexp(product, tree) - np.log(3.0) - self.cost[f, g]
                 found[r, f, g] = np.logaddexp(found[r, f, g], further)
+
+
+def _whitening(absorbed: FloatArray) -> FloatArray:
+    """What makes of the numbers of tests, of which the model absorbs the columns (k, tests), as many independent ones
+    of a variance of one as are left, (left, tests)."""
+    variance, directions = np.linalg.eigh(np.eye(absorbed.shape[1]) - absorbed.T @ absorbed)
+    kept = variance > WHOLLY
+    return np.asarray((directions[:, kept] / np.sqrt(variance[kept])).T)
 
 
 def without_outliers(model: ModelFit) -> ModelFit:
@@ -248,16 +251,13 @@ def _evidence_of_product(
     k = math.prod(sides)
     information, pulls = np.zeros((k, k)), np.zeros(k)
     information[1:, 1:], pulls[1:] = (directions * along) @ directions.T, pull
-    noise = np.repeat(FEW_NOISES, len(FEW_SIZES))
-    sizes = np.tile(FEW_SIZES, len(FEW_NOISES))
-    told = likeliest_products(information.reshape(*sides, *sides), pulls.reshape(sides), sizes, noise).evidence
+    told = likeliest_products(information.reshape(*sides, *sides), pulls.reshape(sides), *OF_FEW).evidence
     return float(_at_likeliest_noise(told.reshape(len(FEW_NOISES), -1, 1), price)[0])
 
 
 def _evidence_of_tree(trees: Trees, pull: FloatArray, price: FloatArray) -> float:
-    """The same for a tree, averaged over all ``trees``, of the pulls (k,) of the knots."""
-    noise, sizes = np.repeat(FEW_NOISES, len(FEW_SIZES)), np.tile(FEW_SIZES, len(FEW_NOISES))
-    each = trees.evidence(trees.pulls(pull.reshape(trees.sides)), sizes, noise)
+    """The same for a tree, averaged over all ``trees``, of the pulls (n, m) of the knots."""
+    each = trees.evidence(trees.pulls(pull), *OF_FEW)
     told = logsumexp(each, axis=0) - np.log(len(each))
     return float(_at_likeliest_noise(told.reshape(len(FEW_NOISES), -1, 1), price)[0])
 
@@ -290,7 +290,7 @@ def _together(courses: Sequence[FloatArray]) -> FloatArray:
     if len(courses) == 1:
         return courses[0]
     one, other = (np.column_stack([np.ones(len(course)), course]) for course in courses)
-    return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)[:, 1:]
+    return each_with_each(one, other)[:, 1:]
 
 
 def free_columns(c: Conditions, without: Collection[str] = ()) -> list[tuple[str, ...]]:
