@@ -17,9 +17,9 @@ from tribo.diagnostics.fit import ModelFit, whitened
 from tribo.diagnostics.model import Setup, log_forces
 from tribo.diagnostics.replicates import drawn_residuals, standardised
 from tribo.lawsearch import free_curves, free_search, model_choice, search
-from tribo.lawsearch.free_curves import Trees, fitted_curve, knots_of, likeliest_products
+from tribo.lawsearch.free_curves import Trees, at_knots, fitted_curve, knots_of, likeliest_products, on_either_side
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes, likeliest, without_outliers
-from tribo.lawsearch.grammar import ADHESION_TERM, ALL, BOTH, T, WrittenLaw
+from tribo.lawsearch.grammar import ADHESION_TERM, ALL, BOTH, T, WrittenLaw, column_values
 from tribo.lawsearch.model_choice import CLOSE, Background, Form, FoundLaw
 from tribo.lawsearch.scoring import Grammar
 from tribo.lawsearch.search import TAIL_OF_EVIDENCE
@@ -183,6 +183,34 @@ def test_a_surface_that_is_a_product_or_a_tree_lies_nearer_to_it_than_one_of_any
 
     monkeypatch.setattr(free_curves, f"_members_of_{kind}", unlikely)
     assert with_kind < nearer * off()
+
+
+def test_a_jump_lies_anywhere_between_two_knots() -> None:
+    """Drawn again and again, it is before or after a test as often as the test's place says."""
+    model, law = with_surface("trees")
+    c = model.setup.observations.conditions
+    interpolated = at_knots(law.shapes, c)
+    one, other = np.indices([len(shape.values) for shape in law.shapes]).reshape(2, -1)
+    heights = 0.3 * (one > 4) - 0.2 * (one > 4) * (other > 7)
+    rng, drawn = np.random.default_rng(8), []
+    x, y = (np.array(column_values(c, name)) for name in law.columns)
+    first, second = (np.array(shape.values) for shape in law.shapes)
+    for _ in range(4000):
+        beyond = x > rng.uniform(first[4], first[5])
+        drawn.append(0.3 * beyond - 0.2 * beyond * (y > rng.uniform(second[7], second[8])))
+    assert np.allclose(interpolated @ heights, np.mean(drawn, axis=0), atol=0.01)
+    assert np.allclose(on_either_side(interpolated, heights), np.var(drawn, axis=0), atol=0.001)
+
+
+@pytest.mark.parametrize("kind", HIDDEN)
+def test_only_a_surface_that_jumps_is_uncertain_between_its_knots(kind: str) -> None:
+    model, law = with_surface(kind)
+    curve = fitted_curve(model, (law, np.ones((model.setup.observations.n, 2))), 1.0)
+    course = at_knots(law.shapes, model.setup.observations.conditions)
+    if kind == "trees":
+        assert curve.between.max() == pytest.approx(on_either_side(course, curve.heights).max(), rel=0.2)
+    else:
+        assert curve.between.max() < 0.05 * on_either_side(course, curve.heights).max()
 
 
 def sliding_alone(s: Setup) -> np.ndarray:

@@ -96,7 +96,8 @@ class FreeCurve:
     ``columns`` (n, 2, knots) of ln T are those of the curve at each knot; ``heights`` (knots,) are what the campaign
     tells of ln T there, where the law acts fully, about a mean of zero over its tests, with their ``covariance``.
     ``prior`` (knots, r) spans the curves that are likely, and ``evidence`` is the log of the marginal likelihood over
-    none.
+    none. ``between`` (n,) is the variance of the course of every test that lies between two knots where the surface may
+    jump: the place of a jump is not known closer than the knots on either side.
     """
 
     law: WrittenLaw
@@ -105,6 +106,7 @@ class FreeCurve:
     covariance: FloatArray
     prior: FloatArray
     evidence: float
+    between: FloatArray
 
 
 def at_knots(shapes: Sequence[Shape], c: Conditions) -> FloatArray:
@@ -148,9 +150,9 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
     """
     law, effects = scope
     c = without.setup.observations.conditions
-    courses = at_knots(law.shapes, c)
+    interpolated = at_knots(law.shapes, c)
     acts = np.abs(law.weight(c))
-    courses = courses - acts @ courses / acts.sum()
+    courses = interpolated - acts @ interpolated / acts.sum()
     columns = courses[:, None, :] * effects[:, :, None]
     rows, residual = without.cleared(columns)
     information, pull = rows.T @ rows, rows.T @ residual
@@ -158,7 +160,7 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
     roots = [size * root for root in map(_root, likely(law.shapes)) for size in sizes]
     found = [_member(information, pull, root, informed) for root in roots]
     span = np.average([root @ root.T for root in roots], axis=0, weights=softmax([m.evidence for m in found]))
-    evidence = _mean_evidence(found)
+    evidence, jumps = _mean_evidence(found), 0
     if len(law.shapes) > 1:
         kinds = (
             found, _members_of_products(law.shapes, information, pull, informed),
@@ -166,11 +168,21 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
         )  # fmt: skip
         evidence = float(logsumexp([_mean_evidence(kind) for kind in kinds]) - np.log(len(kinds)))
         found = [replace(m, evidence=m.evidence - np.log(len(kind))) for kind in kinds for m in kind]
+        jumps = len(kinds[-1])
     share = softmax([m.evidence for m in found])
     heights = np.average([m.heights for m in found], axis=0, weights=share)
     spread = [m.covariance + np.outer(m.heights - heights, m.heights - heights) for m in found]
     covariance = np.average(spread, axis=0, weights=share)
-    return FreeCurve(law, columns, heights, covariance, _root(span), evidence)
+    between = np.zeros(len(c.sample))
+    for k in range(len(found) - jumps, len(found)):
+        between += share[k] * on_either_side(interpolated, found[k].heights)
+    return FreeCurve(law, columns, heights, covariance, _root(span), evidence, between)
+
+
+def on_either_side(interpolated: FloatArray, heights: FloatArray) -> FloatArray:
+    """The variance (n,) of courses ``interpolated`` (n, knots) between ``heights`` (knots,) that jump somewhere between
+    two knots: a test there is on either side of the jump, with the weights of the interpolation as chances."""
+    return np.maximum(interpolated @ heights**2 - (interpolated @ heights) ** 2, 0.0)
 
 
 @dataclass(frozen=True)

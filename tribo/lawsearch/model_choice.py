@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp, softmax
-from scipy.stats import chi2
+from scipy.stats import chi2, t
 
 from tribo.diagnostics.candidates import PER_PARAMETER, refitted
 from tribo.diagnostics.contrasts import FORM
@@ -23,7 +23,16 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import estimates, gain, informed_share
 from tribo.diagnostics.model import Acting, Target, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
-from tribo.lawsearch.free_curves import AS_GOOD, FreeCurve, at_knots, better_left_out, curve_of, fitted_curve, knots_of
+from tribo.lawsearch.free_curves import (
+    AS_GOOD,
+    FOLDS,
+    FreeCurve,
+    at_knots,
+    better_left_out,
+    curve_of,
+    fitted_curve,
+    knots_of,
+)
 from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, certain_pair, free_columns, free_scopes, likeliest
 from tribo.lawsearch.grammar import (
     BOTH,
@@ -48,13 +57,14 @@ from tribo.records import FloatArray
 from tribo.vocabulary import described
 
 CLOSE = 3.0  # log likelihood within which laws cannot be told apart: odds of 20 to 1
+SECOND = 2.0  # by which a second column has to be likelier than none and than another one: odds of 7 to 1
 IN_REACH = 8.0  # below the best on the coarse grid, within which a form is looked at on the fine one
 LOOKED_AT = 40  # forms at most on the fine grid
 MOST_IN_BAND = 8  # forms whose changes make up a band
 TOLD = 7  # places along a curve at which a law is told
 LOW_TO_HIGH = (0.1, 0.5, 0.9)  # quantiles of each column at which a surface is told
 WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
-CONTRADICTED = 0.05  # chance of a formula that fits the values of a column worse, if it is true
+CONTRADICTED = 0.05  # chance of what is true, below which the values of a column or tests left out contradict it
 PLACED = ("step", "soft step", "ramp", "optimum", "log optimum", "hump", "window")  # kinds with a place
 WIDE = ("hump", "saturating", "soft step", "window")  # kinds with a width
 FITTED = 3  # of the best forms, with the weights of the tests and without
@@ -234,8 +244,8 @@ def _with_heights(curve: FreeCurve) -> WrittenLaw:
 
 
 def _likelier_surface(model: ModelFit, at: Background, law: WrittenLaw, without: Collection[str]) -> FreeCurve | None:
-    """A surface of two columns where a campaign speaks for it beyond a law of one and it predicts tests that were left
-    out no worse, or in place of a formula of two where it predicts them better; None elsewhere."""
+    """A surface of two columns where a campaign speaks for it beyond a law of one and tests that were left out do not
+    contradict it, or in place of a formula of two where it predicts them better; None elsewhere."""
     sets = free_columns(at.conditions, without)
     if set(law.columns) & OF_SERIES or not any(len(each) > 1 for each in sets):
         return None
@@ -245,12 +255,12 @@ def _likelier_surface(model: ModelFit, at: Background, law: WrittenLaw, without:
     own = [each for each in sets if set(each) <= {*pair, *law.columns}]
     search = FreeSearch(left, *free_scopes(at.conditions), own)
     (alone, _, _), (apart, columns, scope) = likeliest(search, 1, 2)
-    if len(law.columns) == 1 and apart < alone + CLOSE:
+    if len(law.columns) == 1 and apart < alone + SECOND:
         return None
     surface = _settled_surface(model, _surface(scope, columns, left), without)
     if surface is None:
         return None
-    least = AS_GOOD if len(law.columns) > 1 else -AS_GOOD
+    least = AS_GOOD if len(law.columns) > 1 else float(t.ppf(CONTRADICTED, FOLDS - 1))
     return surface if better_left_out(model, at.after, surface, least) else None
 
 
@@ -261,13 +271,13 @@ def _settled_surface(model: ModelFit, surface: FreeCurve, without: Collection[st
     for _ in range(ROUNDS):
         at = Background(model, _with_heights(surface))
         left = replace(at.without, residual=at.residual)
-        pair = certain_pair(FreeSearch(left, *free_scopes(at.conditions, (at.law,)), sets), CLOSE)
+        pair = certain_pair(FreeSearch(left, *free_scopes(at.conditions, (at.law,)), sets), SECOND)
         if pair is None:
             return None
         own = [each for each in sets if set(each) <= set(pair)]
         search = FreeSearch(left, *free_scopes(at.conditions), own)
         (alone, _, _), (apart, columns, scope) = likeliest(search, 1, 2)
-        if apart < alone + CLOSE:
+        if apart < alone + SECOND:
             return None
         surface = _surface(scope, columns, left)
         if (columns, scope) == (at.law.columns, replace(at.law, shapes=())):
@@ -355,7 +365,8 @@ def _change_of_any_form(at: Background, curve: FreeCurve, without: Collection[st
     for each in curves:
         columns = [centred(one, at.conditions, at.terms[LOAD_TERM]) for one in np.moveaxis(each.columns, 2, 0)]
         beyond = np.stack(columns, axis=2)
-        changes.append((beyond @ each.heights, np.einsum("nri,ij,nrj->nr", beyond, each.covariance, beyond)))
+        spread = np.einsum("nri,ij,nrj->nr", beyond, each.covariance, beyond)
+        changes.append((beyond @ each.heights, spread + each.between[:, None] * at.effects(scope)[0] ** 2))
     mean = np.average([value for value, _ in changes], axis=0, weights=share)
     spread = np.average([own + (value - mean) ** 2 for value, own in changes], axis=0, weights=share)
     return mean, np.maximum(spread, 0.0)
