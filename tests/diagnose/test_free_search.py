@@ -19,7 +19,7 @@ from tribo.diagnostics.replicates import drawn_residuals, standardised
 from tribo.lawsearch import free_curves, free_search, model_choice, search
 from tribo.lawsearch.free_curves import Trees, at_knots, fitted_curve, knots_of, likeliest_products, on_either_side
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes, likeliest, without_outliers
-from tribo.lawsearch.grammar import ADHESION_TERM, ALL, BOTH, T, WrittenLaw, column_values
+from tribo.lawsearch.grammar import ADHESION_TERM, ALL, BOTH, Shape, T, WrittenLaw, column_values
 from tribo.lawsearch.model_choice import CLOSE, Background, Form, FoundLaw
 from tribo.lawsearch.scoring import Grammar
 from tribo.lawsearch.search import TAIL_OF_EVIDENCE
@@ -292,6 +292,28 @@ def test_the_more_telling_of_formula_and_curve_is_told(
     search.discover_laws(campaign())
     assert tried[0] == first
     assert len(tried) == 2
+
+
+@pytest.mark.parametrize(
+    ("beyond_one_column", "left_out", "told"),
+    [(2.1, 0.5, True), (1.9, 0.5, False), (2.1, -2.0, True), (2.1, -2.3, False), (30.0, -2.3, False)],
+)
+def test_a_second_column_is_told_at_odds_of_7_to_1_unless_tests_left_out_contradict_it(
+    beyond_one_column: float, left_out: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Contradicted is what fares worse once in twenty times where it is true, of five folds."""
+    model, scope = campaign(), WrittenLaw(())
+    of_both = (10.0 + beyond_one_column, ("temperature_C", "humidity_pct"), scope)
+    of_one = (10.0, ("temperature_C",), scope)
+    monkeypatch.setattr(model_choice, "FreeSearch", lambda *given: None)
+    monkeypatch.setattr(model_choice, "likeliest", lambda _, *numbers: [[of_one, of_both][k - 1] for k in numbers])
+    monkeypatch.setattr(model_choice, "_surface", lambda *given: "surface")
+    monkeypatch.setattr(model_choice, "_settled_surface", lambda _, surface, __: surface)
+    monkeypatch.setattr(model_choice, "better_left_out", lambda *given: left_out > given[3])
+    x = model.setup.observations.conditions.temperature_C
+    alone = WrittenLaw((Shape("linear", "temperature_C", float(x.min()), float(x.max())),))
+    found = model_choice._likelier_surface(model, Background(model, alone), alone, ())
+    assert found == ("surface" if told else None)
 
 
 def adhesion_of_two_samples(s: Setup) -> np.ndarray:

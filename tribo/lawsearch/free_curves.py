@@ -5,8 +5,8 @@ A curve is held at knots along the column. It is uncertain by what the campaign 
 how smooth and how fast it may be (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and
 5). A surface may be a product of two curves; what a campaign says for that follows from Laplace's approximation
 (Tierney and Kadane, J. Am. Stat. Assoc. 81, 82, 1986). Or it may be a tree of four leaves, each of one value (Chipman,
-George and McCulloch, J. Am. Stat. Assoc. 93, 935, 1998). The band of a formula is that of the curve of its column: the
-formula was chosen among many once the data had been seen, the curve was not.
+George and McCulloch, J. Am. Stat. Assoc. 93, 935, 1998), which jumps somewhere between two knots. The band of a formula
+is that of the curve of its column: the formula was chosen among many once the data had been seen, the curve was not.
 """
 
 from __future__ import annotations

@@ -365,8 +365,8 @@ def _change_of_any_form(at: Background, curve: FreeCurve, without: Collection[st
     for each in curves:
         columns = [centred(one, at.conditions, at.terms[LOAD_TERM]) for one in np.moveaxis(each.columns, 2, 0)]
         beyond = np.stack(columns, axis=2)
-        spread = np.einsum("nri,ij,nrj->nr", beyond, each.covariance, beyond)
-        changes.append((beyond @ each.heights, spread + each.between[:, None] * at.effects(scope)[0] ** 2))
+        at_knots_alone = np.einsum("nri,ij,nrj->nr", beyond, each.covariance, beyond)
+        changes.append((beyond @ each.heights, at_knots_alone + each.between[:, None] * at.effects(scope)[0] ** 2))
     mean = np.average([value for value, _ in changes], axis=0, weights=share)
     spread = np.average([own + (value - mean) ** 2 for value, own in changes], axis=0, weights=share)
     return mean, np.maximum(spread, 0.0)
