@@ -160,7 +160,7 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
     roots = [size * root for root in map(_root, likely(law.shapes)) for size in sizes]
     found = [_member(information, pull, root, informed) for root in roots]
     span = np.average([root @ root.T for root in roots], axis=0, weights=softmax([m.evidence for m in found]))
-    evidence, jumps = _mean_evidence(found), 0
+    evidence = _mean_evidence(found)
     if len(law.shapes) > 1:
         kinds = (
             found, _members_of_products(law.shapes, information, pull, informed),
@@ -168,14 +168,14 @@ def fitted_curve(without: ModelFit, scope: tuple[WrittenLaw, FloatArray], inform
         )  # fmt: skip
         evidence = float(logsumexp([_mean_evidence(kind) for kind in kinds]) - np.log(len(kinds)))
         found = [replace(m, evidence=m.evidence - np.log(len(kind))) for kind in kinds for m in kind]
-        jumps = len(kinds[-1])
     share = softmax([m.evidence for m in found])
     heights = np.average([m.heights for m in found], axis=0, weights=share)
     spread = [m.covariance + np.outer(m.heights - heights, m.heights - heights) for m in found]
     covariance = np.average(spread, axis=0, weights=share)
     between = np.zeros(len(c.sample))
-    for k in range(len(found) - jumps, len(found)):
-        between += share[k] * on_either_side(interpolated, found[k].heights)
+    for m, weight in zip(found, share, strict=True):
+        if m.jumps:
+            between += weight * on_either_side(interpolated, m.heights)
     return FreeCurve(law, columns, heights, covariance, _root(span), evidence, between)
 
 
@@ -187,11 +187,13 @@ def on_either_side(interpolated: FloatArray, heights: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Member:
-    """Curves or surfaces of one size and length: log marginal likelihood, heights (knots,) and their covariance."""
+    """Curves or surfaces of one size and length: log marginal likelihood, heights (knots,) and their covariance, and
+    whether they jump between two knots."""
 
     evidence: float
     heights: FloatArray
     covariance: FloatArray
+    jumps: bool = False
 
 
 def _mean_evidence(members: Sequence[_Member]) -> float:
@@ -244,7 +246,7 @@ def _members_of_trees(
             found.append(_member(information, pull, root, informed))
             plain.append(evidence)
     lost = float(logsumexp(every) - np.log(every.size) - logsumexp(plain) + np.log(len(plain)))
-    return [replace(m, evidence=m.evidence + lost) for m in found]
+    return [replace(m, evidence=m.evidence + lost, jumps=True) for m in found]
 
 
 class Trees:

@@ -64,7 +64,7 @@ MOST_IN_BAND = 8  # forms whose changes make up a band
 TOLD = 7  # places along a curve at which a law is told
 LOW_TO_HIGH = (0.1, 0.5, 0.9)  # quantiles of each column at which a surface is told
 WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
-CONTRADICTED = 0.05  # chance of what is true, below which the values of a column or tests left out contradict it
+CONTRADICTED = 0.05  # chance of data like these if a formula or a second column is right, below which it is not told
 PLACED = ("step", "soft step", "ramp", "optimum", "log optimum", "hump", "window")  # kinds with a place
 WIDE = ("hump", "saturating", "soft step", "window")  # kinds with a width
 FITTED = 3  # of the best forms, with the weights of the tests and without
@@ -361,12 +361,12 @@ def _change_of_any_form(at: Background, curve: FreeCurve, without: Collection[st
         curves += surfaces
         evidence += [each.evidence - np.log(len(pairs)) for each in surfaces]
     share = softmax(evidence)
-    changes = []
+    squared, changes = at.effects(scope)[0] ** 2, []
     for each in curves:
         columns = [centred(one, at.conditions, at.terms[LOAD_TERM]) for one in np.moveaxis(each.columns, 2, 0)]
         beyond = np.stack(columns, axis=2)
-        at_knots_alone = np.einsum("nri,ij,nrj->nr", beyond, each.covariance, beyond)
-        changes.append((beyond @ each.heights, at_knots_alone + each.between[:, None] * at.effects(scope)[0] ** 2))
+        of_heights = np.einsum("nri,ij,nrj->nr", beyond, each.covariance, beyond)
+        changes.append((beyond @ each.heights, of_heights + each.between[:, None] * squared))
     mean = np.average([value for value, _ in changes], axis=0, weights=share)
     spread = np.average([own + (value - mean) ** 2 for value, own in changes], axis=0, weights=share)
     return mean, np.maximum(spread, 0.0)
