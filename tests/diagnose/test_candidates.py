@@ -80,6 +80,13 @@ def test_the_first_that_chance_does_not_make_as_strong_is_the_best() -> None:
     assert best_beyond_chance([], seen, 0.01) is None
 
 
+def test_what_is_not_likely_once_its_choices_are_paid_for_explains_no_misfit() -> None:
+    """Odds of 100 to 1 are 4.6 of log likelihood; one wrong label of 300 pays 5.7 for being chosen."""
+    seen = screened([], [k / 50 for k in range(200)])
+    assert best_beyond_chance([candidate(4.5, raw=40.0)], seen, 0.01) is None
+    assert best_beyond_chance([candidate(4.7, raw=40.0)], seen, 0.01) is not None
+
+
 def ranked_by(start_left: np.ndarray, target: np.ndarray, name: str) -> list[str]:
     acting = tuple(Acting(MECHANISMS[name], str(k)) for k in range(start_left.shape[1]))
     pull, length = start_left.T @ target, np.sqrt(np.sum(start_left**2, axis=0))
@@ -206,23 +213,39 @@ def layered(*names: str) -> Any:
     return Named(tuple(names), left, causes)  # type: ignore[arg-type]
 
 
-def test_each_cause_but_the_last_is_picked_again_beside_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def picked_again(monkeypatch: pytest.MonkeyPatch, *found: str | None) -> tuple[Named, list[tuple[str, ...]]]:
+    """Suction, run-in and humidity picked again, where beside the others ``found`` is best or, None, nothing likely;
+    and the models beside which they were weighed, the formulas of whose causes are open."""
     beside: list[tuple[str, ...]] = []
 
-    def refitted(model: Any, acting: list[Acting]) -> tuple[str, ...]:
-        beside.append(tuple(a.mechanism.name for a in acting))
+    def opened(model: Any) -> tuple[str, ...]:
+        beside.append(model)
         return beside[-1]
 
-    def weighed(alone: tuple[str, ...], barred: Any) -> list[CauseCandidate]:
-        return [candidate(12.0, name="tilt" if len(beside) == 1 else "temperature")]
+    def weighed(before: Any, barred: Any) -> list[CauseCandidate]:
+        name = found[len(beside) - 1]
+        return [candidate(4.0, raw=12.0) if name is None else candidate(12.0, name=name)]
 
-    monkeypatch.setattr(naming, "refitted", refitted)
-    monkeypatch.setattr(naming, "start_effects", lambda model: model)
+    monkeypatch.setattr(naming, "refitted", lambda model, acting: tuple(a.mechanism.name for a in acting))
+    monkeypatch.setattr(naming, "allowed_wrong_form", opened)
+    monkeypatch.setattr(naming, "start_effects", lambda model: SimpleNamespace(model=model))
     monkeypatch.setattr(naming, "weigh", weighed)
     monkeypatch.setattr(naming, "sort_rivals", lambda model, best, ranked: ((best,), ()))
-    found = naming._picked_again(layered("suction", "run_in", "humidity"), ())
+    monkeypatch.setattr(naming, "_on_top_of", lambda model, each: each)
+    seen = screened([], [k / 50 for k in range(200)])
+    return naming._picked_again(layered("suction", "run_in", "humidity"), (), seen, 0.01), beside
+
+
+def test_each_cause_but_the_last_is_picked_again_beside_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, beside = picked_again(monkeypatch, "tilt", "temperature")
     assert [[c.acting.name for c in alike] for alike in found.causes] == [["tilt"], ["temperature"], ["humidity"]]
     assert beside == [("run_in", "humidity"), ("tilt", "humidity")]
+
+
+def test_a_cause_in_whose_place_nothing_is_likely_beside_others_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, beside = picked_again(monkeypatch, None, "temperature")
+    assert [[c.acting.name for c in alike] for alike in found.causes] == [["temperature"], ["humidity"]]
+    assert beside == [("run_in", "humidity"), ("humidity",)]
 
 
 def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_wrong(
@@ -238,7 +261,8 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
 
     left: Any = SimpleNamespace(p=np.array([0.001]))
     monkeypatch.setattr(naming, "weigh", lambda *_: [])
-    monkeypatch.setattr(naming, "start_effects", lambda model: model)
+    monkeypatch.setattr(naming, "allowed_wrong_form", lambda model: model)
+    monkeypatch.setattr(naming, "start_effects", lambda model: SimpleNamespace(model=model))
     monkeypatch.setattr(naming, "_grown", grown)
     monkeypatch.setattr(naming, "_misfit_in_own_column", lambda cause, *_: cause.acting.name == "run_in")
     monkeypatch.setattr(naming, "_picked_again", lambda layers, *_: layers)
@@ -263,12 +287,13 @@ def chosen_of(monkeypatch: pytest.MonkeyPatch, best: CauseCandidate | None, stre
     monkeypatch.setattr(naming, "best_beyond_chance", lambda *_: best)
     monkeypatch.setattr(naming, "strongest_beside_mechanisms", lambda *_: other)
     monkeypatch.setattr(naming, "sort_rivals", lambda model, best, ranked: ((best,), ()))
+    monkeypatch.setattr(naming, "_on_top_of", lambda model, found: found)
     monkeypatch.setattr(naming, "with_free_columns", lambda *_: None)
     monkeypatch.setattr(naming, "fit", lambda *_, **__: None)
     setup: Any = SimpleNamespace(observations=SimpleNamespace(flat="F"))
     model: Any = SimpleNamespace(setup=setup, acting=())
     seen: Any = None
-    grown = naming._grown(Named(model, seen), [], 0.01)
+    grown = naming._grown(Named(model, seen), model, [], 0.01)
     if grown is None:
         return "neither"
     assert len(grown.causes) + len(grown.remainders) == 1
@@ -362,8 +387,8 @@ def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> 
     """A swap among hundreds is stronger than chance makes any; pressure has no choices to pay for, but is within it."""
     found = of_two_halves()
     assert found.named is not None
-    candidate, chance = found.named.weighed[0], replace(found.screened, chance_library=np.linspace(2.0, 3.0, 100))
-    pressure, swap = replace(candidate, gain=3.7, raw=3.7), replace(candidate, gain=2.4, raw=8.1)
+    candidate, chance = found.named.weighed[0], replace(found.screened, chance_library=np.linspace(2.0, 3.5, 100))
+    pressure, swap = replace(candidate, gain=5.3, raw=5.3), replace(candidate, gain=5.2, raw=10.9)
     assert best_beyond_chance([pressure, swap], chance, 0.01) is swap
     assert best_beyond_chance([pressure], chance, 0.01) is None
 

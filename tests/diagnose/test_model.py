@@ -11,6 +11,7 @@ import pytest
 from tribo.diagnostics.model import (
     ALIKE_IN_BOTH,
     APART,
+    DEGREES,
     FIXED,
     GAIN,
     LAW_BOUNDS,
@@ -21,6 +22,7 @@ from tribo.diagnostics.model import (
     Setup,
     Target,
     added,
+    along_what_it_follows,
     candidates,
     effect_of,
     predict,
@@ -209,27 +211,49 @@ def test_the_tests_of_a_setup_that_are_kept_keep_everything_about_them() -> None
     assert np.array_equal(part.group, s.group)
 
 
-def test_a_form_error_lets_each_effect_be_off_by_a_share_of_itself_per_sample_and_regime_in_size_and_slope() -> None:
+def test_a_form_error_lets_an_effect_be_off_by_a_share_of_itself_along_what_it_follows_and_by_sample_and_regime() -> (
+    None
+):
     s = campaign()
     acting, values = named("suction"), (np.array([8e3]),)
     wider = with_form_error(s, LAW, acting, values, 0.2)
     change = effect_of(s, LAW, acting[0], values[0])
     further = wider.dense[:, :, s.dense.shape[2] :]
     c = s.observations.conditions
+    along = along_what_it_follows(acting[0], c)
+    assert along.shape == (s.observations.n, DEGREES) == (s.observations.n, 3)
+    assert further[:, :, :3] == pytest.approx(change[:, :, None] * along[:, None, :])
     wanted = [
         (sample, regime, shape)
         for shape in (np.ones_like(s.log_pressure), s.log_pressure)
         for sample in ("A", "B", "C")  # there is no suction on F
         for regime in (0, 1)
     ]
-    assert further.shape[2] == len(wanted) == 12
-    for k, (sample, regime, shape) in enumerate(wanted):
+    assert further.shape[2] == 3 + len(wanted) == 15
+    for k, (sample, regime, shape) in enumerate(wanted, start=3):
         assert further[:, regime, k] == pytest.approx(change[:, regime] * (c.sample == sample) * shape)
         assert not further[:, 1 - regime, k].any()
-    assert wider.unit[-12:].tolist() == [0.2] * 12
-    assert wider.group[-12:].tolist() == [FIXED] * 12
-    assert len(wider.unit) == len(wider.group) == len(s.unit) + 12
+    assert wider.unit[-15:].tolist() == [0.2] * 15
+    assert wider.group[-15:].tolist() == [FIXED] * 15
+    assert len(wider.unit) == len(wider.group) == len(s.unit) + 15
     assert with_form_error(s, LAW, (), (), 0.2) is s
+
+
+def test_a_formula_is_off_by_smooth_courses_of_its_own_column_or_of_the_load_of_a_mean_square_of_one() -> None:
+    """Three polynomials along the logarithm of positive numbers, without a constant; nothing where it does not vary."""
+    c = campaign().observations.conditions
+    n = len(c.sample)
+    speed = np.geomspace(1e-5, 1e-3, n)
+    (velocity,), (suction,) = named("velocity_dependence"), named("suction")
+    along = along_what_it_follows(velocity, replace(c, speed_m_s=speed))
+    assert np.mean(np.sum(along**2, axis=1)) == pytest.approx(1.0, abs=0.1)
+    assert along.mean(axis=0) == pytest.approx(0.0, abs=0.1)
+    line = np.polyfit(np.log(speed), along[:, 0], 1)
+    assert along[:, 0] == pytest.approx(np.polyval(line, np.log(speed)))
+    assert along_what_it_follows(velocity, replace(c, speed_m_s=np.full(n, 1e-4))).shape == (n, 0)
+    of_load = along_what_it_follows(suction, replace(c, speed_m_s=speed))[:, 0]
+    line = np.polyfit(np.log(c.normal_load_N), of_load, 1)
+    assert of_load == pytest.approx(np.polyval(line, np.log(c.normal_load_N)))
 
 
 def test_every_mechanism_that_the_design_can_show_is_a_candidate_with_each_of_its_choices() -> None:

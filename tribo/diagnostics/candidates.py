@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import softmax
 
-from tribo.diagnostics.contrasts import Screen
+from tribo.diagnostics.contrasts import Screen, allowed_wrong_form
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import ADHESION, Acting, Target, effect_of, with_free_columns
 from tribo.diagnostics.observations import session_of
@@ -233,9 +233,10 @@ def name_causes(
         if named.p_left >= level:
             break
         barred = {*excluded, *named.wrong_in_form}
-        ranked = weigh(start if named.model is start.model else start_effects(named.model), barred)
+        before = start if named.model is start.model else start_effects(allowed_wrong_form(named.model))
+        ranked = weigh(before, barred)
         weighed = weighed or tuple(ranked)
-        grown = _grown(named, ranked, level)
+        grown = _grown(named, before.model, ranked, level)
         if grown is None:
             break
         left = screen_of(grown.model)
@@ -244,7 +245,7 @@ def name_causes(
             named = replace(named, wrong_in_form=tuple(sorted({*named.wrong_in_form, newest.name})))
         else:
             named = replace(grown, left=left)
-    standing = _standing(_picked_again(named, excluded), first, level)
+    standing = _standing(_picked_again(named, excluded, first, level), first, level)
     if standing is not named:
         named = replace(standing, left=screen_of(standing.model))
     if named.remainders:
@@ -254,8 +255,9 @@ def name_causes(
 
 
 def best_beyond_chance(ranked: Sequence[CauseCandidate], seen: Screen, level: float) -> CauseCandidate | None:
-    """The first of those that chance does not make as strong; what is within chance explains no misfit."""
-    return next((c for c in ranked if seen.p_library(c.strength) < level), None)
+    """The first of those that chance does not make as strong, and that are likely once their choices are paid for; what
+    is within chance explains no misfit."""
+    return next((c for c in ranked if c.gain > LIKELY and seen.p_library(c.strength) < level), None)
 
 
 def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Screen | None:
@@ -268,18 +270,38 @@ def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Screen
     return None
 
 
-def _grown(named: Named, ranked: Sequence[CauseCandidate], level: float) -> Named | None:
-    """One layer more: the best mechanism, unless a free course of a column explains far more; None without either."""
+def _grown(named: Named, before: ModelFit, ranked: Sequence[CauseCandidate], level: float) -> Named | None:
+    """One layer more: the best mechanism, unless a free course of a column explains far more; None without either.
+
+    ``before`` is the model on top of which they were ``ranked``, the formulas of its causes allowed to be off.
+    """
     best = best_beyond_chance(ranked, named.left, level)
     other = strongest_beside_mechanisms(named.left, level, named.model.setup.observations.flat)
     if best is not None and (other is None or best.raw > 0.5 * float(other.strength[0]) ** 2 - CLOSE):
-        alike, rivals = sort_rivals(named.model, best, ranked)
-        return replace(named, model=best.fit, causes=(*named.causes, alike), rivals=rivals)
+        alike, rivals = (_on_top_of(named.model, found) for found in sort_rivals(before, best, ranked))
+        return replace(named, model=alike[0].fit, causes=(*named.causes, alike), rivals=rivals)
     if other is None:
         return None
     wider = with_free_columns(named.model.setup, other.contrasts[0].columns, other.coefficients[0])
     model = fit(wider, named.model.acting, start=named.model)
     return replace(named, model=model, remainders=(*named.remainders, other))
+
+
+def _on_top_of(model: ModelFit, found: Sequence[CauseCandidate]) -> tuple[CauseCandidate, ...]:
+    """The same candidates, fitted on top of a model whose causes follow their formulas."""
+    return tuple(
+        c if c.fit.setup is model.setup else replace(c, fit=fit(model.setup, c.fit.acting, start=c.fit)) for c in found
+    )
+
+
+def beside_others(model: ModelFit, acting: Acting) -> CauseCandidate:
+    """What one of the mechanisms of a model earns beside the others, by its formula or one that is off by as much as
+    theirs may be."""
+    others = [a for a in model.acting if a is not acting]
+    without = allowed_wrong_form(refitted(model, others))
+    by_formula = refitted(without, [*others, acting])
+    nearly = allowed_wrong_form(by_formula, len(others))
+    return max((judged(without, f, 0.0) for f in (by_formula, nearly)), key=lambda c: c.raw)
 
 
 def _misfit_in_own_column(cause: CauseCandidate, left: Screen, level: float) -> bool:
@@ -296,26 +318,36 @@ def _misfit_in_own_column(cause: CauseCandidate, left: Screen, level: float) -> 
     )
 
 
-def _picked_again(named: Named, excluded: Collection[str]) -> Named:
-    """Each cause but the last was picked before the later ones were known: pick it again beside them."""
-    for k in range(len(named.causes) - 1):
-        acting = [alike[0].acting for alike in named.causes]
-        alone = refitted(named.model, [a for j, a in enumerate(acting) if j != k])
-        ranked = weigh(start_effects(alone), {*excluded, *named.wrong_in_form})
-        if not ranked:
+def _picked_again(named: Named, excluded: Collection[str], first: Screen, level: float) -> Named:
+    """Each cause but the last was picked before the later ones were known: pick it again beside them, or leave it out
+    where nothing is beyond chance there."""
+    for alike in named.causes[:-1]:
+        k = next(k for k, known in enumerate(named.causes) if known[0].acting is alike[0].acting)
+        alone = _without(named, alike[0].acting)
+        before = start_effects(allowed_wrong_form(alone.model))
+        ranked = weigh(before, {*excluded, *named.wrong_in_form})
+        best = best_beyond_chance(ranked, first, level)
+        if best is None:
+            named = alone
             continue
-        alike, others = sort_rivals(alone, ranked[0], ranked)
-        causes = (*named.causes[:k], alike, *named.causes[k + 1 :])
-        named = replace(named, model=ranked[0].fit, causes=causes, rivals=(*named.rivals, *others))
+        found, others = (_on_top_of(alone.model, each) for each in sort_rivals(before.model, best, ranked))
+        causes = (*named.causes[:k], found, *named.causes[k + 1 :])
+        named = replace(named, model=found[0].fit, causes=causes, rivals=(*named.rivals, *others))
     return named
 
 
 def _standing(named: Named, first: Screen, level: float) -> Named:
     """The causes that are still beyond chance when all other layers are there."""
     for alike in named.causes if len(named.causes) + len(named.remainders) > 1 else ():
-        others = [a[0].acting for a in named.causes if a is not alike]
-        without = refitted(named.model, others)
-        beside = judged(without, refitted(without, [*others, alike[0].acting]), 0.0)
-        if first.p_library(beside.strength) >= level:
-            named = replace(named, model=without, causes=tuple(a for a in named.causes if a is not alike))
+        if first.p_library(beside_others(named.model, alike[0].acting).strength) >= level:
+            named = _without(named, alike[0].acting)
     return named
+
+
+def _without(named: Named, acting: Acting) -> Named:
+    """The same without one cause: the model, and the candidates of the others, are fitted without it."""
+    kept, causes = [alike for alike in named.causes if alike[0].acting is not acting], []
+    for alike in kept:
+        others = [known[0].acting for known in kept if known is not alike]
+        causes.append(tuple(replace(c, fit=refitted(c.fit, [*others, c.acting])) for c in alike))
+    return replace(named, model=refitted(named.model, [alike[0].acting for alike in kept]), causes=tuple(causes))

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from tribo.diagnostics.candidates import CauseCandidate, Named, judged, refitted, weights_of
+from tribo.diagnostics.candidates import CauseCandidate, Named, beside_others, judged, refitted, weights_of
 from tribo.diagnostics.column_search import with_repeats
 from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.direct_evidence import OF_ZERO, Evidence, stated_evidence
-from tribo.diagnostics.effect_sizes import RECORDED, misfit_of_contrast, percent
+from tribo.diagnostics.effect_sizes import misfit_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
 from tribo.diagnostics.inference import (
     gain,
@@ -22,7 +22,7 @@ from tribo.diagnostics.inference import (
     pattern_excess,
     with_open_form,
 )
-from tribo.diagnostics.model import effect_of
+from tribo.diagnostics.model import RECORDED, effect_of
 from tribo.diagnostics.observations import observe, too_little
 from tribo.diagnostics.planning import more_tests, next_test_of
 from tribo.diagnostics.score_statistics import Absorption, StartEffects, recorded_in_part
@@ -186,6 +186,7 @@ def cause_layers(
         others = [a[0].acting for a in named.causes if a is not alike]
         without = refitted(named.model, others) if others else before
         beside = judged(without, refitted(without, [*others, acting]), 0.0)
+        p = first.p_library(beside_others(named.model, acting).strength)
         size = np.abs(effect_of(beside.fit.setup, beside.fit.law, acting, beside.values))
         # of two specimens that were swapped, one changes up as far as the other down: the first is taken
         test, regime = map(int, np.unravel_index(int(size.round(9).argmax()), size.shape))
@@ -202,7 +203,7 @@ def cause_layers(
             kind="cause", name=best.name,
             samples=tuple(str(name) for name in np.unique(sample) if size[sample == name].max() > least),
             regimes=tuple(r for k, r in enumerate(REGIMES) if size[:, k].max() > least),
-            p_adjusted=first.p_library(beside.strength), effect_percent=value, low=low, high=high,
+            p_adjusted=p, effect_percent=value, low=low, high=high,
             parameters=parameters, formula=m.formula, tied_with=tuple(c.name for c in tied),
             gain=gain(without, beside.fit, rng), choice=acting.choice, most=(REGIMES[regime], str(sample[test]), load),
         )  # fmt: skip

@@ -11,12 +11,12 @@ from typing import Literal
 import numpy as np
 
 from tribo.diagnostics.contrasts import BEND, Contrast, Screen
+from tribo.diagnostics.model import RECORDED
 from tribo.diagnostics.verdict import Misfit
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
 NORMAL_90 = 1.645  # standard deviations to the ends of a 90 % interval
-RECORDED = ("speed_m_s", "hold_s", "temperature_C", "humidity_pct", "specimen_run", "elapsed_s")
 ENDS = (0.05, 0.95)  # quantiles of a column between which a change is stated
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, softmax
 from scipy.stats import chi2, norm
 
-from tribo.diagnostics.effect_sizes import NORMAL_90, RECORDED, rms_percent
+from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
 from tribo.diagnostics.fit import ModelFit, fit, fit_without, precision_of
 from tribo.diagnostics.model import (
     ALIKE_IN_BOTH,
@@ -29,6 +29,7 @@ from tribo.diagnostics.model import (
     Acting,
     Setup,
     Target,
+    along_what_it_follows,
     effect_of,
 )
 from tribo.diagnostics.normal_equations import Normal, block_cholesky, model_columns
@@ -46,7 +47,6 @@ RESAMPLES = 400
 MOST_FOLDS = 30  # of whole specimens: where there are more of them, several are left out at a time
 UNKNOWN = 25.0  # variance of ln T: its factor is uncertain by e to the 5
 FORM_SHARES = (0.03, 0.06, 0.12)  # of its own effect, by which a formula may be off along a column, to average over
-DEGREES = 3  # of the polynomials along what it follows
 PATTERN_STEPS = np.linspace(-0.8, 1.2, 6)  # of the logarithm of the pattern error about its estimate, to average over
 
 
@@ -98,16 +98,9 @@ def with_open_form(f: ModelFit, index: int) -> dict[str, Estimate]:
 def _with_form(f: ModelFit, index: int, share: float) -> ModelFit:
     """The fit where the change of ln T by a mechanism may differ by a ``share`` of itself, in a smooth course."""
     s, acting = f.setup, f.acting[index]
-    c, needs = s.observations.conditions, acting.mechanism.needs
-    x = c.recorded(needs[0]) if len(needs) == 1 and needs[0] in RECORDED else c.normal_load_N
-    x = np.where(np.isfinite(x), x, np.nanmean(x))
-    x = np.log(x) if x.min() > 0.0 else x
-    if np.ptp(x) == 0.0:
-        return f
-    courses = np.polynomial.legendre.legvander(2.0 * (x - x.min()) / np.ptp(x) - 1.0, DEGREES)[:, 1:]
-    courses = courses * np.sqrt((2.0 * np.arange(1, DEGREES + 1) + 1.0) / DEGREES)
+    courses = along_what_it_follows(acting, s.observations.conditions)
     change = effect_of(s, f.law, acting, f.values[index])
-    wider = s.with_effects(change[:, :, None] * courses[:, None, :], np.full(DEGREES, share))
+    wider = s.with_effects(change[:, :, None] * courses[:, None, :], np.full(courses.shape[1], share))
     return fit(wider, f.acting, start=f, iterations=15)
 
 

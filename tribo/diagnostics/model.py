@@ -41,6 +41,8 @@ COMMON_SHARE = 0.25  # of the smaller variance of an offset: what is expected to
 ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated
 EVERY = -1  # in place of a specimen: all tests
+RECORDED = ("speed_m_s", "hold_s", "temperature_C", "humidity_pct", "specimen_run", "elapsed_s")
+DEGREES = 3  # of the polynomials along what a mechanism follows, by which its formula may be off
 MOST_PAIRS = 2000  # courses of two specimens that are written out at all
 
 
@@ -326,12 +328,13 @@ def _change(acting: Acting, values: FloatArray, base: Base, conditions: Conditio
 def with_form_error(
     s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequence[FloatArray], share: float
 ) -> Setup:
-    """Further random effects that let each mechanism's effect be off by a ``share`` of itself, per sample and regime,
-    in size and slope."""
+    """Further random effects that let each mechanism's effect be off by a ``share`` of itself: on all samples in both
+    regimes by a smooth course along what it follows, and per sample and regime in size and slope."""
     c = s.observations.conditions
     columns = []
     for a, v in zip(acting, values, strict=True):
         change = effect_of(s, law, a, v)
+        columns += [change * course[:, None] for course in along_what_it_follows(a, c).T]
         for shape in (np.ones(s.observations.n), s.log_pressure):
             for sample in np.unique(c.sample):
                 here = (c.sample == sample) * shape
@@ -341,6 +344,22 @@ def with_form_error(
                     if np.abs(column).max() > 1e-6:
                         columns.append(column)
     return s.with_effects(np.stack(columns, axis=2), np.full(len(columns), share)) if columns else s
+
+
+def along_what_it_follows(acting: Acting, c: Conditions) -> FloatArray:
+    """Smooth courses (n, DEGREES) along the column that a mechanism follows, or the load where it follows no single
+    one, together of a mean square of one over its range; (n, 0) where the column does not vary.
+
+    A column of positive numbers counts by its logarithm, a test without a value lies at the mean.
+    """
+    needs = acting.mechanism.needs
+    x = c.recorded(needs[0]) if len(needs) == 1 and needs[0] in RECORDED else c.normal_load_N
+    x = np.where(np.isfinite(x), x, np.nanmean(x))
+    x = np.log(x) if x.min() > 0.0 else x
+    if np.ptp(x) == 0.0:
+        return np.zeros((len(x), 0))
+    courses = np.polynomial.legendre.legvander(2.0 * (x - x.min()) / np.ptp(x) - 1.0, DEGREES)[:, 1:]
+    return np.asarray(courses * np.sqrt((2.0 * np.arange(1, DEGREES + 1) + 1.0) / DEGREES))
 
 
 def with_free_columns(s: Setup, columns: FloatArray, coefficients: FloatArray) -> Setup:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tribo.diagnostics.candidates import judged, refitted
+from tribo.diagnostics.candidates import beside_others, refitted
 from tribo.diagnostics.contrasts import screen_left
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
@@ -178,15 +178,10 @@ def with_misfits(v: Verdict, found: Discovery, told: Collection[str], before: Mo
 def _explained_by_laws(d: Diagnosis, model: ModelFit, level: float) -> tuple[str, ...]:
     """The causes of a diagnosis that are within chance beside the laws of a model."""
     causes = {layer.name for layer in d.verdict.layers if layer.kind == "cause"}
-    idle = []
-    for acting in model.acting:
-        if acting.name in causes:
-            others = [a for a in model.acting if a is not acting]
-            without = refitted(model, others)
-            beside = judged(without, refitted(without, [*others, acting]), 0.0)
-            if d.screened.p_library(beside.strength) >= level:
-                idle.append(acting.name)
-    return tuple(idle)
+    return tuple(
+        acting.name for acting in model.acting
+        if acting.name in causes and d.screened.p_library(beside_others(model, acting).strength) >= level
+    )  # fmt: skip
 
 
 def law_layers(d: Discovery) -> list[Layer]:
