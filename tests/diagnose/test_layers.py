@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 from blind.direct import ingested
 from blind.tribometer import Design, hide
+from laboratories.campaign import make
+from laboratories.effects import hide_effect
+from laboratories.handed_over import handed_over
+from laboratories.laboratory import drawn_laboratory
 from scipy.stats import norm
 
 from tribo.diagnostics import examine
@@ -54,6 +58,14 @@ def test_three_causes_at_once_are_all_named() -> None:
     v = examine(made(three_effects, seed=1), replicates=FEW).verdict
     assert {c.mechanism for c in v.causes} >= {"tilt", "run_in", "temperature"}
     assert {layer.name for layer in v.layers if layer.kind == "cause"} == {"tilt", "run_in", "temperature"}
+
+
+def test_a_cause_whose_formula_is_off_along_the_load_has_no_wrong_weight_beside_it() -> None:
+    """A hidden suction whose change of ln T is off by a smooth course of the load, 12 % of itself in the mean."""
+    seed = 986586287
+    hidden = make(seed, drawn_laboratory(seed), hide=hide_effect("suction", 1.4115, off=0.12))
+    v = examine(handed_over(hidden.bench, seed), seed=seed, replicates=FEW).verdict
+    assert [c.mechanism for c in v.causes] == ["suction"]
 
 
 def test_a_cause_that_follows_a_recorded_column_is_told_from_its_lowest_to_its_highest_recorded_value() -> None:
