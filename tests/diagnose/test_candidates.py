@@ -248,6 +248,27 @@ def test_a_cause_in_whose_place_nothing_is_likely_beside_others_is_left_out(monk
     assert beside == [("run_in", "humidity"), ("humidity",)]
 
 
+@pytest.mark.parametrize(("by_an_open_form", "earned"), [(15.0, 15.0), (7.0, 10.0)])
+def test_a_cause_earns_beside_the_open_forms_of_the_others_what_its_formula_does_or_one_that_is_off(
+    monkeypatch: pytest.MonkeyPatch, by_an_open_form: float, earned: float
+) -> None:
+    opened: list[tuple[int, int]] = []
+
+    def refitted(model: Any, acting: list[Acting]) -> Any:
+        return SimpleNamespace(score=10.0 * len(acting) - 20.0, acting=tuple(acting), values=[np.ones(1)] * len(acting))
+
+    def allowed(model: Any, known: int = 0) -> Any:
+        opened.append((len(model.acting), known))
+        return model if known == 0 else SimpleNamespace(**{**vars(model), "score": by_an_open_form - 10.0})
+
+    monkeypatch.setattr(naming, "refitted", refitted)
+    monkeypatch.setattr(naming, "allowed_wrong_form", allowed)
+    suction, humidity = Acting(MECHANISMS["suction"]), Acting(MECHANISMS["humidity"])
+    model: Any = SimpleNamespace(acting=(suction, humidity))
+    assert naming.beside_others(model, suction).raw == earned
+    assert opened == [(1, 0), (2, 1)]  # the others, then the cause itself beside them
+
+
 def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_wrong(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
