@@ -194,6 +194,20 @@ def test_the_band_of_a_formula_holds_what_the_formula_does_not_follow() -> None:
     assert np.mean(held) > 0.85  # 0.78 for what the formula leaves alone
 
 
+def seven_turns(s: Setup) -> np.ndarray:
+    order = s.observations.conditions.run_order
+    return 0.08 * np.sin(2.0 * np.pi * 7.0 * order / order.max())[:, None] * np.ones(2)
+
+
+def test_the_band_of_a_wave_over_the_series_holds_it_although_drift_could_take_it_up() -> None:
+    (law,) = discover_laws(baseline(made(seven_turns, seed=3, design=DESIGN)), replicates=20).laws
+    assert set(law.law.columns) <= {"run_order", "elapsed_s"}
+    s = law.model.setup
+    true = centred(seven_turns(s), s.observations.conditions, terms_of(law.model)["load term"])
+    assert ((law.band[1] <= true) & (true <= law.band[2])).mean() > 0.75
+    assert np.median(law.band[2] - law.band[1]) < 0.5 * np.ptp(true)
+
+
 def test_a_surface_is_written_and_read_again_and_holds_where_it_is_at_work(surface: FoundLaw, tmp_path: Path) -> None:
     (tmp_path / "law.toml").write_text(law_text(surface.law, surface.parameters, "two columns"), encoding="utf-8")
     again = read_law(tmp_path / "law.toml")

@@ -26,6 +26,7 @@ from tribo.diagnostics.inference import gain_on_groups
 from tribo.lawsearch.grammar import (
     MOST_VALUES,
     PRESSURES,
+    TIMES,
     UNITS,
     Shape,
     WrittenLaw,
@@ -49,8 +50,9 @@ AS_GOOD = 1.0  # standard errors by which tests left out may favour a curve over
 
 def curve_of(column: str, c: Conditions) -> Shape | None:
     """The curve of a column of numbers, zero everywhere, with its knots: evenly spaced, or in the logarithm where the
-    column spans much; None where it has few values, or where the flat law follows it."""
-    if column in PRESSURES or column == "clock_h":
+    column spans much; None where it has few values, or where the flat law, days or drift follow it: a curve of time is
+    what the drift of the series is."""
+    if column in PRESSURES or column in TIMES:
         return None
     x = recorded_values(c, column)
     if len(np.unique(x)) <= MOST_VALUES:

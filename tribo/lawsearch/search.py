@@ -16,7 +16,7 @@ from tribo.diagnostics.inference import gain_on_groups
 from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
 from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes
-from tribo.lawsearch.grammar import WrittenLaw
+from tribo.lawsearch.grammar import TIMES, WrittenLaw
 from tribo.lawsearch.model_choice import CLOSE, FoundLaw, choose_form, choose_free
 from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.records import FloatArray
@@ -29,7 +29,6 @@ SHOWN = 25  # of the best laws, in the table
 MOST_LAWS = 3
 SEARCHES = 2  # of formulas, and of curves and surfaces: a chance of either counts twice
 TAIL_OF_EVIDENCE = 1.0  # scale of the tail of an evidence ln k: its chance is at most 1 / k (Markov's inequality)
-TIMES = {"run_order", "elapsed_s", "clock_h", "date"}  # what days and drift follow as well
 BEYOND_DRIFT = 2.0  # standard errors by which a law of time has to predict sessions left out better than drift
 
 
