@@ -99,6 +99,8 @@ def _with_form(f: ModelFit, index: int, share: float) -> ModelFit:
     """The fit where the change of ln T by a mechanism may differ by a ``share`` of itself, in a smooth course."""
     s, acting = f.setup, f.acting[index]
     courses = along_what_it_follows(acting, s.observations.conditions)
+    if not courses.shape[1]:
+        return f
     change = effect_of(s, f.law, acting, f.values[index])
     wider = s.with_effects(change[:, :, None] * courses[:, None, :], np.full(courses.shape[1], share))
     return fit(wider, f.acting, start=f, iterations=15)
