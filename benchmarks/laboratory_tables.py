@@ -532,6 +532,8 @@ def sized_rows(rows: list[Row]) -> list[tuple[str, float, bool, float]]:
         truth = r["truth"]["percent"]
         own = [x for x in r["layers"] if x["kind"] == "law" and x["name"] == r["truth"]["column"]]
         if own and None not in (own[0]["low"], own[0]["high"]):
+            if "curve(" in own[0]["formula"] and truth < 0.0:  # a curve tells its highest value over its lowest
+                truth = 100.0 * (1.0 / (1.0 + truth / 100.0) - 1.0)
             name = f"{r['truth']['form']} of {r['truth']['column']}"
             held = own[0]["low"] <= truth <= own[0]["high"]
             found.append((name, r["truth"]["off"], held, own[0]["effect"] / truth))
