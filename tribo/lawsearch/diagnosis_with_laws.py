@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -54,11 +55,15 @@ def with_laws(
         d = replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, known=answers)))
     settled = {name for law in answers if law.answer == "held" for name in law.law.columns}
     level, of_nuisance = d.share_of_level * level, level
-    found = discover_laws(with_known, level=LEVEL_OF_LAWS * level, rng=rng, progress=progress, without=settled)
+    search = partial(
+        discover_laws, level=LEVEL_OF_LAWS * of_nuisance, of_series=d.share_of_level, rng=rng, progress=progress,
+        without=settled,
+    )  # fmt: skip
+    found = search(with_known)
     idle_beside: tuple[str, ...] = ()
     if found.laws and (idle := _explained_by_laws(d, found.laws[-1].model, level)):
         without = refitted(with_known, [a for a in with_known.acting if a.name not in idle])
-        again = discover_laws(without, level=LEVEL_OF_LAWS * level, rng=rng, progress=progress, without=settled)
+        again = search(without)
         if again.laws:
             found, with_known, idle_beside = again, without, idle
     found = replace(found, of_causes=forms)
@@ -110,8 +115,8 @@ def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress:
     ``level`` is that of a misfit; a law has to be beyond chance at LEVEL_OF_LAWS times it.
     """
     model, _, forms = without_refuted_causes(explained(d))
-    strict = LEVEL_OF_LAWS * d.share_of_level * level
-    found = discover_laws(model, level=strict, rng=np.random.default_rng(seed), progress=progress)
+    rng = np.random.default_rng(seed)
+    found = discover_laws(model, level=LEVEL_OF_LAWS * level, of_series=d.share_of_level, rng=rng, progress=progress)
     return replace(found, of_causes=forms)
 
 

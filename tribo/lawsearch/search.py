@@ -15,7 +15,7 @@ from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.inference import gain_on_groups
 from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
-from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes
+from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, free_columns, free_scopes
 from tribo.lawsearch.grammar import TIMES, WrittenLaw
 from tribo.lawsearch.model_choice import CLOSE, FoundLaw, choose_form, choose_free
 from tribo.lawsearch.scoring import Grammar, Projection
@@ -52,6 +52,7 @@ def discover_laws(
     model: ModelFit,
     *,
     level: float = 0.01,
+    of_series: float = 1.0,
     replicates: int = 60,
     rng: np.random.Generator | None = None,
     progress: Progress | None = None,
@@ -68,6 +69,9 @@ def discover_laws(
         A fitted campaign, with its causes if it has any.
     level : float
         Chance of writing a law where nothing is hidden.
+    of_series : float
+        Share of the level for a law of the series (run order, pulls of a specimen, time): less than one where days and
+        drift are certain, whose shapes are those of the model in part only.
     replicates : int
         Simulated campaigns at most, each searched in the same way.
     rng : numpy Generator, optional
@@ -92,7 +96,8 @@ def discover_laws(
         free = _worth_counting(model, used)
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
         draws = Draws(replicates, rng, progress)
-        formula = partial(_law_of_a_formula, model, grammar, scored[0][0], scored[0][2], level, draws)
+        own_level = of_series * level if set(scored[0][0].columns) & OF_SERIES else level
+        formula = partial(_law_of_a_formula, model, grammar, scored[0][0], scored[0][2], own_level, draws)
         ways = [(scored[0][2], formula)]
         if free is not None:
             ways.append((float(free.measured.max()), partial(_law_of_no_formula, model, free, used, level, draws)))
