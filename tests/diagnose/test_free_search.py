@@ -275,6 +275,19 @@ def test_a_curve_from_which_the_fit_gains_nothing_is_no_law(monkeypatch: pytest.
     assert found() == ()
 
 
+@pytest.mark.parametrize(("column", "expected"), [("specimen_run", 0.0005), ("run_order", 0.0005), ("hold_s", 0.005)])
+def test_beside_certain_days_and_drift_a_law_of_the_series_has_to_be_rarer_and_others_not(
+    column: str, expected: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    levels: list[float] = []
+    best = WrittenLaw((Shape("linear", column, 1.0, 9.0),))
+    monkeypatch.setattr(search, "_scored", lambda *given: [(best, 25.0, 20.0)])
+    monkeypatch.setattr(search, "_worth_counting", lambda *given: None)
+    monkeypatch.setattr(search, "_law_of_a_formula", lambda *given: levels.append(given[-2]))
+    search.discover_laws(campaign(), level=0.005, of_series=0.1)
+    assert levels == pytest.approx([expected])
+
+
 @pytest.mark.parametrize(("of_a_curve", "first"), [(21.0, "curve"), (19.0, "formula")])
 def test_the_more_telling_of_formula_and_curve_is_told(
     of_a_curve: float, first: str, monkeypatch: pytest.MonkeyPatch
