@@ -325,8 +325,10 @@ def screen(
 
 def allowed_wrong_form(model: ModelFit, allowed: int = 0) -> ModelFit:
     """The model with its laws allowed to be wrong in form by a share of their own effect; the first ``allowed`` of them
-    are already."""
+    are already. Where there are no others, it is the model itself."""
     acting, values = model.acting[allowed:], model.values[allowed:]
+    if not acting:
+        return model
     wider = with_form_error(model.setup, model.law, acting, values, FORM)
     return fit(wider, model.acting, start=model, iterations=10)
 

@@ -54,9 +54,9 @@ def with_laws(
     if answers:
         d = replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, known=answers)))
     settled = {name for law in answers if law.answer == "held" for name in law.law.columns}
-    level, of_nuisance = d.share_of_level * level, level
+    asked, level = level, d.share_of_level * level
     search = partial(
-        discover_laws, level=LEVEL_OF_LAWS * of_nuisance, of_series=d.share_of_level, rng=rng, progress=progress,
+        discover_laws, level=LEVEL_OF_LAWS * asked, of_series=d.share_of_level, rng=rng, progress=progress,
         without=settled,
     )  # fmt: skip
     found = search(with_known)
@@ -86,7 +86,7 @@ def with_laws(
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
         *(x for x in verdict.layers if x.kind == "remainder" and x.name in open_columns),
-        *nuisance_layers(model, of_nuisance),
+        *nuisance_layers(model, asked),
     )  # fmt: skip
     next_test = verdict.next_test
     alike = [law.ties if law.levels else (law.law, *law.ties) for law in found.laws]

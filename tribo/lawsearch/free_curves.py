@@ -52,7 +52,7 @@ def curve_of(column: str, c: Conditions) -> Shape | None:
     """The curve of a column of numbers, zero everywhere, with its knots: evenly spaced, or in the logarithm where the
     column spans much; None where it has few values, or where the flat law, days or drift follow it: a curve of time is
     what the drift of the series is."""
-    if column in PRESSURES or column in TIMES:
+    if column in PRESSURES | TIMES:
         return None
     x = recorded_values(c, column)
     if len(np.unique(x)) <= MOST_VALUES:

@@ -85,8 +85,7 @@ def discover_laws(
     found: list[FoundLaw] = []
     table: tuple[tuple[WrittenLaw, float, float], ...] = ()
     searched = 0
-    if model.acting:
-        model = allowed_wrong_form(model)
+    model = allowed_wrong_form(model)
     while len(found) < MOST_LAWS:
         used = {*without, *(name for law in found for name in law.law.columns)}
         grammar = Grammar(model, used)
