@@ -260,6 +260,20 @@ def best_beyond_chance(ranked: Sequence[CauseCandidate], seen: Screen, level: fl
     return next((c for c in ranked if c.gain > LIKELY and seen.p_library(c.strength) < level), None)
 
 
+def with_strength_of_causes(seen: Screen, ranked: Sequence[CauseCandidate]) -> Screen:
+    """The screen where every likely cause is as strong as its fit says, with all noise estimated beside it.
+
+    A screen tests at the noise of the model without causes: what a cause changes on all patterns looks there like
+    patterns that the model describes badly, and its own score is weak.
+    """
+    strength = seen.strength.copy()
+    for c in ranked:
+        if c.gain > LIKELY:
+            here = np.array([contrast.acting is c.acting for contrast in seen.contrasts])
+            strength[here] = np.maximum(strength[here], c.strength)
+    return replace(seen, strength=strength, p=np.array([seen.p_adjusted(float(value)) for value in strength]))
+
+
 def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Screen | None:
     """The strongest contrast beyond chance that is no mechanism, alone."""
     for k in np.argsort(-seen.strength):
