@@ -16,8 +16,9 @@ from scipy.special import softmax
 
 from tribo.diagnostics.contrasts import Screen, allowed_wrong_form
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import ADHESION, Acting, Target, effect_of, with_free_columns
+from tribo.diagnostics.model import ADHESION, FIXED, Acting, Target, effect_of, with_free_columns
 from tribo.diagnostics.observations import session_of
+from tribo.diagnostics.scatter import held_at
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
 from tribo.display import displayed
 from tribo.records import FloatArray
@@ -260,17 +261,24 @@ def best_beyond_chance(ranked: Sequence[CauseCandidate], seen: Screen, level: fl
     return next((c for c in ranked if c.gain > LIKELY and seen.p_library(c.strength) < level), None)
 
 
-def with_strength_of_causes(seen: Screen, ranked: Sequence[CauseCandidate]) -> Screen:
-    """The screen where every likely cause is as strong as its fit says, with all noise estimated beside it.
+def with_errors_of_patterns_anew(seen: Screen, start: StartEffects, excluded: Collection[str]) -> Screen:
+    """The screen where every likely cause is stronger by what the errors of the patterns earn when their size is
+    estimated beside it.
 
-    A screen tests at the noise of the model without causes: what a cause changes on all patterns looks there like
-    patterns that the model describes badly, and its own score is weak.
+    A screen tests near the noise of the model without causes. What a cause changes on all patterns looks there like
+    patterns that the model describes badly, and its score is weak. All other noise stays as it is.
     """
+    s, sizes = start.model.setup, start.model.noise.sizes
+    free, others = s.of_patterns, ~s.of_patterns & (s.group != FIXED)
     strength = seen.strength.copy()
-    for c in ranked:
-        if c.gain > LIKELY:
-            here = np.array([contrast.acting is c.acting for contrast in seen.contrasts])
-            strength[here] = np.maximum(strength[here], c.strength)
+    if not free.any():
+        return seen
+    before, still = (fit(held_at(s, here, sizes), start=start.model) for here in (others, others | free))
+    for c in weigh(replace(start, model=before), excluded):
+        here = [contrast.acting is c.acting for contrast in seen.contrasts]
+        if c.gain > LIKELY and any(here):
+            earned = c.raw - judged(still, fit(still.setup, c.fit.acting, start=c.fit), 0.0).raw
+            strength[here] = np.sqrt(strength[here] ** 2 + 2.0 * max(earned, 0.0))
     return replace(seen, strength=strength, p=np.array([seen.p_adjusted(float(value)) for value in strength]))
 
 

@@ -19,7 +19,7 @@ from tribo.diagnostics.candidates import (
     name_causes,
     weigh,
     weights_of,
-    with_strength_of_causes,
+    with_errors_of_patterns_anew,
 )
 from tribo.diagnostics.conclusion import conclude, exclusions, never_weighed
 from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
@@ -133,8 +133,8 @@ def examine(
     strongest = screened.contrasts[int(np.argmax(screened.strength))].column
     share = BESIDE_DRIFT if certain and strongest != "time of day" else 1.0  # what comes back every day is no drift
     level, of_nuisance = share * level, level
-    if screened.p.min() >= level:
-        screened = with_strength_of_causes(screened, weigh(effects, never_weighed(barred)))
+    if screened.p.min() >= level and not certain:
+        screened = with_errors_of_patterns_anew(screened, effects, never_weighed(barred))
     if screened.p.min() >= level:
         without = screened_at(still)
         if without[1].p.min() < level and _a_cause_instead(effects.model, without, offset, level):

@@ -21,7 +21,6 @@ from tribo.diagnostics.fit import ModelFit, fit, fit_without, precision_of
 from tribo.diagnostics.model import (
     ALIKE_IN_BOTH,
     DRIFT,
-    FIXED,
     N_LAW,
     OF_PATTERNS,
     SESSION,
@@ -35,7 +34,7 @@ from tribo.diagnostics.model import (
 from tribo.diagnostics.normal_equations import Normal, block_cholesky, model_columns
 from tribo.diagnostics.observations import Observations, along_specimens
 from tribo.diagnostics.replicates import drawn_residuals, refits
-from tribo.diagnostics.scatter import SIZE_PRIORS, Noise, held_still, log_size_prior, prior_sd
+from tribo.diagnostics.scatter import SIZE_PRIORS, Noise, held_at, held_still, log_size_prior, prior_sd
 from tribo.diagnostics.verdict import Estimate, Gain, Layer, Nuisance
 from tribo.records import REGIMES, FloatArray
 
@@ -150,10 +149,7 @@ def pattern_factor(f: ModelFit) -> float:
 def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
     """The fit with the error of the patterns held at ``factor`` times what the predictor states; what both regimes have
     in common of it stays as it is."""
-    s = f.setup
-    sizes = f.noise.sizes[np.maximum(s.group, 0)] * factor / pattern_factor(f)
-    unit, group = np.where(s.of_patterns, sizes * s.unit, s.unit), np.where(s.of_patterns, FIXED, s.group)
-    held = replace(s, unit=unit, group=group)
+    held = held_at(f.setup, f.setup.of_patterns, f.noise.sizes * factor / pattern_factor(f))
     return fit(held, f.acting, start=f, iterations=15)
 
 

@@ -59,13 +59,18 @@ def first_noise() -> Noise:
     return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), sizes)
 
 
+def held_at(s: Setup, here: NDArray[np.bool_], sizes: FloatArray) -> Setup:
+    """The same with the random effects that are ``here`` (q,) held at the ``sizes`` of their groups."""
+    unit = np.where(here, sizes[np.maximum(s.group, 0)] * s.unit, s.unit)
+    return replace(s, unit=unit, group=np.where(here, FIXED, s.group))
+
+
 def held_still(s: Setup, nuisances: NDArray[np.bool_]) -> tuple[Setup, float]:
     """The same with the random effects of ``nuisances`` (q,) held at the size that is expected of none; and the log
     density of these sizes, by which the score of a fit is to be raised to be compared with one where they are free."""
-    groups = np.unique(s.group[nuisances])
-    sizes = SIZE_PRIORS[np.maximum(s.group, 0), 0]
-    held = replace(s, unit=np.where(nuisances, sizes * s.unit, s.unit), group=np.where(nuisances, FIXED, s.group))
-    return held, float(sum(log_size_prior(int(g), np.asarray(SIZE_PRIORS[g, 0])) for g in groups))
+    expected = SIZE_PRIORS[:, 0]
+    density = sum(float(log_size_prior(int(g), expected[g])) for g in np.unique(s.group[nuisances]))
+    return held_at(s, nuisances, expected), float(density)
 
 
 def whitener(s: Setup, noise: Noise) -> FloatArray:
