@@ -93,6 +93,24 @@ def test_a_specimen_that_lies_far_out_has_no_other_area(hidden: str, more: bool)
     assert _more_than_groups_differ(start, area) == more
 
 
+@pytest.mark.parametrize(("hidden", "more"), [("patterns", False), ("weight", True)])
+def test_patterns_that_the_model_describes_badly_at_one_load_have_no_wrong_weight(hidden: str, more: bool) -> None:
+    """A wrong weight explains something of such patterns too. It is a cause where the flat sample shows it as well."""
+    bench = make(3, PATTERNS_OFF).bench
+    here = bench.column("mass_g") == 50.0
+    if hidden == "patterns":
+        multiply(bench, np.outer(here & (bench.column("sample") != "F"), [0.08, 0.08]))
+    else:
+        multiply(bench, np.log1p(0.15 * here[:, None] * (1.0 - bench.adhesion_N() / both(bench))))
+    o = observe(handed_over(bench, 3))
+    start = fit(setup(o, tabled_predictor(o.patterns)))
+    known = candidates(start.setup, start.law)
+    acting = next(a for a in known if a.name == "wrong_weight" and a.choice.startswith("mass 50"))
+    weight = judged(start, refitted(start, (acting,)), 0.0)
+    assert weight.gain > 6.0
+    assert _more_than_groups_differ(start, weight) == more
+
+
 def test_the_remedy_says_which_weight_to_weigh() -> None:
     v, value = told_of("weight")
     assert v.causes[0].text.endswith(f"Weigh the {value.removesuffix('.0')} g weight.")

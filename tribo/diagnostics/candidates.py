@@ -16,7 +16,7 @@ from scipy.special import softmax
 
 from tribo.diagnostics.contrasts import Screen, allowed_wrong_form
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import ADHESION, FIXED, Acting, Target, effect_of, with_free_columns
+from tribo.diagnostics.model import ADHESION, FIXED, WITHIN, Acting, Target, effect_of, with_free_columns
 from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.scatter import held_at
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
@@ -99,21 +99,30 @@ def _adhesion_turns_negative(start: ModelFit, c: CauseCandidate) -> bool:
 
 
 def _more_than_groups_differ(start: ModelFit, c: CauseCandidate) -> bool:
-    """Whether a cause of whole sessions, or of one specimen, is likely beside a factor of any size on these in each
-    regime.
+    """Whether a cause of whole sessions, of one specimen or of whole loads is likely beside what else sets these apart.
 
-    One day or one specimen may differ from the others by far more than is usual, and a physical cause of it has to show
-    more than that: another course in the load and the samples. A recorded column claims no more than that it differs,
-    and a label that is wrong says by how much.
+    One day or one specimen may differ from the others by far more than is usual, and the model may be wrong about each
+    pattern at one load by as much as it may be at all of them. A physical cause has to show more than a factor on the
+    tests of that day or specimen, or on those of every pattern at that load, in each regime. A recorded column claims
+    no more than that it differs, and a label that is wrong says by how much.
     """
     s, m = c.fit.setup, c.acting.mechanism
     here = np.any(np.abs(effect_of(s, c.fit.law, c.acting, c.values)) > NO_CHANGE, axis=1)
-    session, specimen = session_of(s.observations.conditions), s.specimen
+    session, specimen, load = session_of(s.observations.conditions), s.specimen, s.log_pressure.round(4)
     of_sessions = not np.isin(session[~here], session[here]).any()
     of_one_specimen = len(np.unique(specimen[here])) == 1 and m.choosing.all_or_nothing_sd is None
-    if m.any_column or here.all() or not (of_sessions or of_one_specimen):
+    of_loads = not np.isin(load[~here], load[here]).any()
+    if m.any_column or here.all() or not (of_sessions or of_one_specimen or of_loads):
         return True
-    apart = s.with_effects(here[:, None, None] * np.eye(2), np.full(2, ANY_FACTOR))
+    if of_sessions or of_one_specimen:
+        groups, sizes = [here], np.full((1, 2), ANY_FACTOR)
+    else:
+        sample, error = s.observations.conditions.sample, s.predictor.error
+        groups = [here & (sample == name) for name in np.unique(sample)]
+        sizes = WITHIN * np.array([error[name].offset for name in np.unique(sample)])
+    factors = np.stack(groups, axis=1)[:, None, :, None] * np.eye(2)[:, None, :]
+    known = sizes.ravel() > 0.0
+    apart = s.with_effects(factors.reshape(len(here), 2, -1)[:, :, known], sizes.ravel()[known])
     differs = fit(apart, start.acting, start=start)
     beside = judged(differs, fit(apart, c.fit.acting, start=c.fit), 0.0)
     return beside.raw > LIKELY
@@ -275,7 +284,7 @@ def with_errors_of_patterns_anew(seen: Screen, start: StartEffects, excluded: Co
         return seen
     before, still = (fit(held_at(s, here, sizes), start=start.model) for here in (others, others | free))
     for c in weigh(replace(start, model=before), excluded):
-        here = [contrast.acting is c.acting for contrast in seen.contrasts]
+        here = [contrast.acting == c.acting for contrast in seen.contrasts]
         if c.gain > LIKELY and any(here):
             earned = c.raw - judged(still, fit(still.setup, c.fit.acting, start=c.fit), 0.0).raw
             strength[here] = np.sqrt(strength[here] ** 2 + 2.0 * max(earned, 0.0))

@@ -25,6 +25,7 @@ from tribo.diagnostics.model import (
     OF_PATTERNS,
     SESSION,
     SPECIMEN_DRIFT,
+    WITHIN,
     Acting,
     Setup,
     Target,
@@ -231,9 +232,6 @@ def _score_at(f: ModelFit, index: int, k: int, value: float) -> float:
     values[index][k] = value
     begin = replace(f, acting=tuple(acting), values=tuple(values))
     return fit(f.setup, acting, start=begin, noise=f.noise, iterations=12).score
-
-
-WITHIN = 1.5  # times the stated error of the model: the range for which docs/blind.md counts false alarms
 
 
 def pattern_excess(f: ModelFit) -> tuple[float, float] | None:

@@ -37,6 +37,7 @@ LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 1
 # their errors have in common in both regimes, and what each regime has of its own.
 GAIN, SLOPE, PATTERN, SPECIMEN_DRIFT, SESSION, DRIFT = 0, 2, 4, 7, 9, 11
 OF_PATTERNS = (PATTERN, PATTERN + 1, PATTERN + 2)
+WITHIN = 1.5  # times the stated error of the model: the range for which docs/blind.md counts false alarms
 COMMON_SHARE = 0.25  # of the smaller variance of an offset: what is expected to be common to both regimes
 ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated

@@ -20,9 +20,7 @@ from tribo.records import FloatArray
 # sessions and drift of the series
 SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.01, 2.0), (1.0, 1.0)
 NUISANCE_PRIOR = (0.005, 1.0)
-SIZE_PRIORS = np.array(
-    [*(2 * [SPECIMEN_PRIOR]), *(2 * [SLOPE_PRIOR]), *(3 * [PATTERN_PRIOR]), *(6 * [NUISANCE_PRIOR])]
-)
+SIZE_PRIORS = np.array([*(2 * [SPECIMEN_PRIOR]), *(2 * [SLOPE_PRIOR]), *(3 * [PATTERN_PRIOR]), *(6 * [NUISANCE_PRIOR])])
 FIRST_NUISANCE = 0.03  # size from which the estimation of each of the last six starts
 REPEAT_PRIOR = (0.08, 4.0)
 SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow

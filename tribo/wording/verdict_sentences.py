@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from tribo.diagnostics.conclusion import patterns_apart
-from tribo.diagnostics.inference import WITHIN
+from tribo.diagnostics.model import WITHIN
 from tribo.diagnostics.score_statistics import RecordedInPart
 from tribo.diagnostics.verdict import (
     AgainstModel,
