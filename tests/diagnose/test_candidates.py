@@ -15,24 +15,27 @@ from tribo.diagnostics.candidates import (
     CHOICES_FITTED,
     CLOSE,
     IN_COMMON,
+    LIKELY,
     PER_PARAMETER,
     TIED,
     CauseCandidate,
     Named,
     best_beyond_chance,
     judged,
+    refitted,
     sort_rivals,
     weigh,
     weights_of,
 )
 from tribo.diagnostics.contrasts import FEWEST, Screen, _strongest as strongest, decided, deviate
 from tribo.diagnostics.diagnosis import Diagnosis
-from tribo.diagnostics.model import Acting, Setup
+from tribo.diagnostics.model import Acting, Setup, effect_of
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.mechanisms import MECHANISMS
+from tribo.records import FloatArray
 from tribo.wording.verdict_sentences import worded
 
-from .known import acting, baseline, made
+from .known import LAW, acting, baseline, made
 
 
 def candidate(gain: float, raw: float | None = None, name: str = "suction") -> CauseCandidate:
@@ -395,6 +398,41 @@ def test_a_mechanism_whose_own_column_is_still_wrong_is_left_out_and_said(monkey
     verdict = examine(made(acting("humidity", 0.03), seed=0), replicates=FEW).verdict
     assert "humidity" not in [cause.mechanism for cause in verdict.causes]
     assert "Tried and left out: humidity." in worded(verdict).text
+
+
+@pytest.mark.parametrize("label", ["B2 of B behaves as F", "A1 of A swapped with B3 of B"])
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_specimen_of_a_wrong_label_lies_apart_and_one_that_only_follows_the_load_otherwise_has_none(
+    label: str, whole: bool
+) -> None:
+    """Half of them change by all that the label says, half by twice what it says beside a factor on each specimen."""
+    wrong = Acting(MECHANISMS["mislabelled_specimen"], label)
+
+    def change(s: Setup) -> FloatArray:
+        changed = effect_of(s, LAW, wrong, np.ones(1))
+        for k in np.unique(s.specimen[changed[:, 0] != 0.0]) if not whole else ():
+            changed[s.specimen == k] = 2.0 * (changed[s.specimen == k] - changed[s.specimen == k].mean(axis=0))
+        return changed
+
+    start = baseline(made(change, seed=0, repeat_sd=(0.04, 0.03)))
+    assert naming._specimens_lie_apart(start, judged(start, refitted(start, (wrong,)), 0.0)) == whole
+
+
+def test_every_cause_that_is_likely_has_to_be_possible(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also one that is far behind the best: where that is not possible, it would be the first."""
+    start = start_effects(baseline(made(acting("suction", 2.5e4), seed=0)))
+    asked: list[str] = []
+
+    def none_possible(start: Any, c: CauseCandidate) -> bool:
+        asked.append(c.name)
+        return False
+
+    gains = {c.name: c.gain for c in weigh(start)}
+    assert any(LIKELY < gain < 0.5 * max(gains.values()) - 3.0 for gain in gains.values())
+    monkeypatch.setattr(naming, "_is_possible", none_possible)
+    left = weigh(start)
+    assert {name for name, gain in gains.items() if gain > LIKELY} <= set(asked)
+    assert all(c.gain <= LIKELY for c in left)
 
 
 @cache

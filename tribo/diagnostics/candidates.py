@@ -34,7 +34,7 @@ TIED = (3.0, 0.08)
 ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
 CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart explains about equally
 LIKELY = 4.6  # log likelihood: odds of 100 to 1, the level of a misfit
-ANY_FACTOR = 1.0  # standard deviation of ln T of a day that may differ by any factor
+ANY_FACTOR = 1.0  # standard deviation of ln T of a day or a specimen that may differ by any factor
 NO_CHANGE = 1e-9  # of ln T
 BELOW_ZERO = 2.33  # standard errors: one adhesion of zero in a hundred is fitted further below
 IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
@@ -86,9 +86,15 @@ def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[CauseCand
         judged(start.model, refitted(c.fit, c.fit.acting), c.raw - c.gain) if c.gain > hopeful else c
         for c in tried.values()
     ]
-    possible = [c for c in fitted if c.gain <= hopeful or not _adhesion_turns_negative(start.model, c)]
-    standing = [c for c in possible if c.gain <= hopeful or _more_than_groups_differ(start.model, c)]
+    standing = [c for c in fitted if c.gain <= min(hopeful, LIKELY) or _is_possible(start.model, c)]
     return sorted(standing, key=lambda c: -c.gain)
+
+
+def _is_possible(start: ModelFit, c: CauseCandidate) -> bool:
+    """Whether a cause that earns something holds in what it claims besides."""
+    return (
+        not _adhesion_turns_negative(start, c) and _more_than_groups_differ(start, c) and _specimens_lie_apart(start, c)
+    )
 
 
 def _adhesion_turns_negative(start: ModelFit, c: CauseCandidate) -> bool:
@@ -126,6 +132,22 @@ def _more_than_groups_differ(start: ModelFit, c: CauseCandidate) -> bool:
     differs = fit(apart, start.acting, start=start)
     beside = judged(differs, fit(apart, c.fit.acting, start=c.fit), 0.0)
     return beside.raw > LIKELY
+
+
+def _specimens_lie_apart(start: ModelFit, c: CauseCandidate) -> bool:
+    """Whether the specimens of a wrong label are likelier to differ by a factor of any size each than not to differ.
+
+    A label that is wrong is seen at first as specimens that lie far from the others of their sample. Among hundreds of
+    labels some follow what the model leaves along the load, by specimens that lie where their label says.
+    """
+    s, m = c.fit.setup, c.acting.mechanism
+    if m.choosing.all_or_nothing_sd is None:
+        return True
+    changed = np.any(np.abs(effect_of(s, c.fit.law, c.acting, c.values)) > NO_CHANGE, axis=1)
+    of_each = (s.specimen[:, None] == np.unique(s.specimen[changed])) * 1.0
+    factors = np.concatenate([of_each[:, None, :] * regime[:, None] for regime in np.eye(2)], axis=2)
+    apart = s.with_effects(factors, np.full(factors.shape[2], ANY_FACTOR))
+    return fit(apart, start.acting, start=start).score > start.score
 
 
 def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
