@@ -12,11 +12,12 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import softmax
 
 from tribo.diagnostics.contrasts import Screen, allowed_wrong_form
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import ADHESION, FIXED, WITHIN, Acting, Target, effect_of, with_free_columns
+from tribo.diagnostics.model import ADHESION, FIXED, WITHIN, Acting, Setup, Target, effect_of, with_free_columns
 from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.scatter import held_at
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
@@ -112,8 +113,7 @@ def _more_than_groups_differ(start: ModelFit, c: CauseCandidate) -> bool:
     tests of that day or specimen, or on those of every pattern at that load, in each regime. A recorded column claims
     no more than that it differs, and a label that is wrong says by how much.
     """
-    s, m = c.fit.setup, c.acting.mechanism
-    here = np.any(np.abs(effect_of(s, c.fit.law, c.acting, c.values)) > NO_CHANGE, axis=1)
+    s, m, here = c.fit.setup, c.acting.mechanism, _changed_tests(c)
     session, specimen, load = session_of(s.observations.conditions), s.specimen, s.log_pressure.round(4)
     of_sessions = not np.isin(session[~here], session[here]).any()
     of_one_specimen = len(np.unique(specimen[here])) == 1 and m.choosing.all_or_nothing_sd is None
@@ -121,14 +121,12 @@ def _more_than_groups_differ(start: ModelFit, c: CauseCandidate) -> bool:
     if m.any_column or here.all() or not (of_sessions or of_one_specimen or of_loads):
         return True
     if of_sessions or of_one_specimen:
-        groups, sizes = [here], np.full((1, 2), ANY_FACTOR)
+        apart = _with_factors(s, here[:, None], np.full((1, 2), ANY_FACTOR))
     else:
         sample, error = s.observations.conditions.sample, s.predictor.error
-        groups = [here & (sample == name) for name in np.unique(sample)]
-        sizes = WITHIN * np.array([error[name].offset for name in np.unique(sample)])
-    factors = np.stack(groups, axis=1)[:, None, :, None] * np.eye(2)[:, None, :]
-    known = sizes.ravel() > 0.0
-    apart = s.with_effects(factors.reshape(len(here), 2, -1)[:, :, known], sizes.ravel()[known])
+        patterns = [name for name in np.unique(sample) if min(error[name].offset) > 0.0]
+        sizes = np.array([error[name].offset for name in patterns]).reshape(-1, 2)
+        apart = _with_factors(s, here[:, None] & (sample[:, None] == np.array(patterns, str)), WITHIN * sizes)
     differs = fit(apart, start.acting, start=start)
     beside = judged(differs, fit(apart, c.fit.acting, start=c.fit), 0.0)
     return beside.raw > LIKELY
@@ -140,14 +138,24 @@ def _specimens_lie_apart(start: ModelFit, c: CauseCandidate) -> bool:
     A label that is wrong is seen at first as specimens that lie far from the others of their sample. Among hundreds of
     labels some follow what the model leaves along the load, by specimens that lie where their label says.
     """
-    s, m = c.fit.setup, c.acting.mechanism
-    if m.choosing.all_or_nothing_sd is None:
+    if c.acting.mechanism.choosing.all_or_nothing_sd is None:
         return True
-    changed = np.any(np.abs(effect_of(s, c.fit.law, c.acting, c.values)) > NO_CHANGE, axis=1)
-    of_each = (s.specimen[:, None] == np.unique(s.specimen[changed])) * 1.0
-    factors = np.concatenate([of_each[:, None, :] * regime[:, None] for regime in np.eye(2)], axis=2)
-    apart = s.with_effects(factors, np.full(factors.shape[2], ANY_FACTOR))
+    s = c.fit.setup
+    moved = np.unique(s.specimen[_changed_tests(c)])
+    apart = _with_factors(s, s.specimen[:, None] == moved, np.full((len(moved), 2), ANY_FACTOR))
     return fit(apart, start.acting, start=start).score > start.score
+
+
+def _changed_tests(c: CauseCandidate) -> NDArray[np.bool_]:
+    """The tests (n,) that a cause changes."""
+    return np.any(np.abs(effect_of(c.fit.setup, c.fit.law, c.acting, c.values)) > NO_CHANGE, axis=1)
+
+
+def _with_factors(s: Setup, groups: NDArray[np.bool_], sizes: FloatArray) -> Setup:
+    """The same where the tests of each of ``groups`` (n, k) may differ by a factor in each regime, of the standard
+    deviations ``sizes`` (k, 2) of ln T."""
+    factors = groups[:, None, :, None] * np.eye(2)[:, None, :]
+    return s.with_effects(factors.reshape(len(groups), 2, -1), sizes.ravel())
 
 
 def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
@@ -301,9 +309,9 @@ def with_errors_of_patterns_anew(seen: Screen, start: StartEffects, excluded: Co
     """
     s, sizes = start.model.setup, start.model.noise.sizes
     free, others = s.of_patterns, ~s.of_patterns & (s.group != FIXED)
-    strength = seen.strength.copy()
     if not free.any():
         return seen
+    strength = seen.strength.copy()
     before, still = (fit(held_at(s, here, sizes), start=start.model) for here in (others, others | free))
     for c in weigh(replace(start, model=before), excluded):
         here = [contrast.acting == c.acting for contrast in seen.contrasts]
