@@ -38,7 +38,7 @@ from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.lawsearch.search import RESCORED, Discovery, discover_laws
 from tribo.mechanisms import MECHANISMS
 from tribo.mechanisms.record import Base, Conditions
-from tribo.wording.law_sentences import discovery_sentence, held_sentence, law_sentence, size_sentence
+from tribo.wording.law_sentences import discovery_sentence, held_sentence, law_sentence, size_sentence, tied_laws
 from tribo.wording.part_sentences import layer_sentence, misfit_sentence, next_test_sentence
 from tribo.wording.verdict_sentences import verdict_in_words, worded
 
@@ -58,6 +58,24 @@ def test_no_sentence_on_a_law_shows_the_name_of_a_column_of_the_file(column: str
     said = size_sentence(law, {}, (10.0, 8.0, 12.0))
     assert column not in said
     assert "_" not in said
+
+
+FORMS = ("linear", "log", "optimum", "log optimum", "step", "soft step", "ramp", "window", "hump", "saturating", "wave")
+
+
+@pytest.mark.parametrize("column", UNITS)
+def test_the_formulas_that_a_law_cannot_be_told_from_are_each_said_in_words(column: str) -> None:
+    laws = [WrittenLaw((Shape(kind, column, 1.0, 2.0, place=1.5, width=0.25),)) for kind in FORMS]
+    said = [tied_laws([law], by_values=True) for law in laws]
+    assert len(set(said)) == len(FORMS)
+    assert not [text for text in said if column in text or "_" in text or "*" in text]
+
+
+def test_a_formula_is_said_in_the_unit_in_which_its_column_is_read() -> None:
+    laws = [WrittenLaw((Shape("log optimum", "speed_m_s", 1e-5, 1e-3, place=2e-4),), regime="sliding")]
+    said = "a parabola in the logarithm of the pull speed about 0.2 mm/s"
+    assert tied_laws(laws) == f"This design cannot distinguish it from: {said} (sliding friction)."
+    assert tied_laws(laws, by_values=True) == f"Formulas that these values do not contradict: {said}."
 
 
 def test_a_period_of_the_time_is_told_in_hours() -> None:
@@ -413,25 +431,36 @@ FIVE = Design(samples=("F", "A", "B"), masses_g=(12.0, 50.0, 138.5), speeds_mm_s
 THREE = replace(FIVE, speeds_mm_s=(0.05, 0.2, 0.8))
 
 
-def by_values(at_speed: Callable[[np.ndarray], np.ndarray], design: Design, seed: int = 3) -> FoundLaw:
-    """The law of a campaign whose sliding friction changes with the speed (mm/s) in this way, and with nothing else."""
+def of_speed(at_speed: Callable[[np.ndarray], np.ndarray], design: Design, seed: int = 3) -> Diagnosis:
+    """A campaign whose sliding friction changes with the speed (mm/s) in this way, and with nothing else."""
 
     def change(s: Setup) -> np.ndarray:
         return at_speed(s.observations.conditions.speed_m_s * 1e3)[:, None] * np.array([0.0, 1.0])
 
-    (law,) = with_laws(examine(made(change, seed=seed, design=design), replicates=(40, 20))).laws.laws
+    return examine(made(change, seed=seed, design=design), replicates=(40, 20))
+
+
+def the_law_of(d: Diagnosis) -> FoundLaw:
+    (law,) = with_laws(d).laws.laws
     return law
 
 
 @cache
-def with_a_dip() -> FoundLaw:
+def examined_dip() -> Diagnosis:
     """Sliding friction is lower at the second of three speeds."""
-    return by_values(lambda v: -0.14 * np.isclose(v, 0.2), THREE)
+    return of_speed(lambda v: -0.14 * np.isclose(v, 0.2), THREE)
+
+
+@cache
+def with_a_dip() -> FoundLaw:
+    return the_law_of(examined_dip())
+
+
+DIP = {"0.05": 0.14 / 3, "0.2": -0.14 * 2 / 3, "0.8": 0.14 / 3}
 
 
 def test_a_column_of_few_values_is_told_by_its_values_whatever_the_shape() -> None:
-    dip = with_a_dip()
-    true = {"0.05": 0.14 / 3, "0.2": -0.14 * 2 / 3, "0.8": 0.14 / 3}
+    dip, true = with_a_dip(), DIP
     assert dip.levels.keys() == true.keys()
     for value, change in true.items():
         assert dip.levels[value].low < 100 * (np.exp(change) - 1) < dip.levels[value].high
@@ -440,9 +469,42 @@ def test_a_column_of_few_values_is_told_by_its_values_whatever_the_shape() -> No
 
 
 def test_the_formulas_that_pass_through_the_values_are_listed_and_no_other() -> None:
-    kinds = {tie.shapes[0].kind for tie in by_values(lambda v: -0.05 * np.log(v / 0.1) ** 2, FIVE).ties}
+    kinds = {tie.shapes[0].kind for tie in the_law_of(of_speed(lambda v: -0.05 * np.log(v / 0.1) ** 2, FIVE)).ties}
     assert "log optimum" in kinds
     assert not {"linear", "log", "step"} & kinds
+
+
+def test_where_the_strongest_misfit_follows_few_values_these_are_told_with_its_chance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(diagnosis_with_laws, "LEVEL_OF_LAWS", 0.0)  # nothing is found by search
+    d = examined_dip()
+    law = the_law_of(d)
+    assert (d.verdict.verdict, d.verdict.misfits[0].covariate) == ("unknown", "speed_mm_s")
+    assert law.p == d.verdict.misfits[0].p_adjusted
+    assert law.levels["0.2"].low < 100 * np.expm1(DIP["0.2"]) < law.levels["0.2"].high < 0.0
+
+
+@pytest.mark.parametrize("column", ["specimen_run", "run_order", "normal_load_N", "temperature_C", "specimen A1"])
+def test_a_misfit_of_a_column_of_the_series_of_loads_or_of_many_values_has_no_law_of_its_values(
+    column: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(diagnosis_with_laws, "LEVEL_OF_LAWS", 0.0)
+    d = examined_dip()
+    (first, *_) = d.verdict.misfits
+    d = replace(d, verdict=replace(d.verdict, misfits=(replace(first, covariate=column),)))
+    assert with_laws(d).laws.laws == ()
+
+
+def test_a_misfit_that_a_law_explains_on_the_way_is_listed_no_more_but_that_of_a_pattern_is() -> None:
+    d = examined_dip()
+    (first, *_) = d.verdict.misfits
+    others = tuple(
+        replace(first, covariate=name, sample=sample) for name, sample in (("run_order", ""), ("sample", "A"))
+    )
+    v = with_laws(replace(d, verdict=replace(d.verdict, misfits=(first, *others)))).verdict
+    assert v.shows.within_chance
+    assert [m.covariate for m in v.misfits] == ["speed_m_s", "sample"]
 
 
 def test_a_law_by_values_is_written_and_read_again(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tribo.diagnostics.candidates import beside_others, refitted
+from tribo.diagnostics.candidates import LIKELY, beside_others, refitted
 from tribo.diagnostics.contrasts import screen_left
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
@@ -17,9 +17,17 @@ from tribo.diagnostics.inference import nuisance_layers, pattern_corrections
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
+from tribo.lawsearch.free_search import OF_SERIES
 from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
 from tribo.lawsearch.known_laws import KnownLaw, law_layer, validate_law, validate_laws
-from tribo.lawsearch.model_choice import levels_of_cause, without_refuted_causes
+from tribo.lawsearch.model_choice import (
+    SAME,
+    SERIES,
+    FoundLaw,
+    choose_levels,
+    levels_of_cause,
+    without_refuted_causes,
+)
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray, Ingested
@@ -60,6 +68,8 @@ def with_laws(
         without=settled,
     )  # fmt: skip
     found = search(with_known)
+    if not found.laws and (law := _values_of_misfit(d, with_known, settled, level, rng)) is not None:
+        found = replace(found, laws=(law,))
     idle_beside: tuple[str, ...] = ()
     if found.laws and (idle := _explained_by_laws(d, found.laws[-1].model, level)):
         without = refitted(with_known, [a for a in with_known.acting if a.name not in idle])
@@ -81,7 +91,10 @@ def with_laws(
         if p < level and contrast.kind != "mechanism"
     }  # fmt: skip
     left_over = without_causes(d.verdict, gone, idle_beside)
-    verdict = with_misfits(left_over, found, explained_by_laws - open_columns, with_known)
+    told = explained_by_laws - open_columns
+    if not with_known.acting and found.laws:  # nor is a misfit left of a column that the laws explain on the way
+        told |= {m.covariate for m in left_over.misfits if m.covariate not in {"sample", *open_columns}}
+    verdict = with_misfits(left_over, found, told, with_known)
     open_columns -= explained_by_laws
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
@@ -178,6 +191,21 @@ def with_misfits(v: Verdict, found: Discovery, told: Collection[str], before: Mo
         return replace(v, misfits=(*misfits, *kept))
     next_test = v.next_test if v.equivalent else first_test_of(before, misfits[0].covariate)
     return replace(v, verdict=outcome, misfits=(*kept, *misfits), next_test=next_test)
+
+
+def _values_of_misfit(
+    d: Diagnosis, model: ModelFit, settled: Collection[str], level: float, rng: np.random.Generator
+) -> FoundLaw | None:
+    """The law of the values of a column of few, where the strongest misfit follows that column and no cause does.
+
+    It says no more than the misfit, of which it keeps the chance: it was not searched for.
+    """
+    if d.verdict.verdict != "unknown" or not d.verdict.misfits or d.verdict.misfits[0].p_adjusted >= level:
+        return None
+    strongest = d.verdict.misfits[0]
+    column = SAME.get(strongest.covariate, strongest.covariate)
+    law = choose_levels(model, column, {*settled, *OF_SERIES, *SERIES}, strongest.p_adjusted, rng)
+    return law if law is not None and law.model.score - model.score >= LIKELY else None
 
 
 def _explained_by_laws(d: Diagnosis, model: ModelFit, level: float) -> tuple[str, ...]:

@@ -228,6 +228,19 @@ def choose_free(
     return choose_form(model, grammar, grammar.law(first), p, rng)
 
 
+def choose_levels(
+    model: ModelFit, column: str, without: Collection[str], p: float, rng: np.random.Generator
+) -> FoundLaw | None:
+    """The law of the values of a column, of the chance ``p``; None where it has many, or is none of those searched."""
+    every = shapes_of(model.setup.observations.conditions, without)
+    shapes = [each for each in every if {shape.column for shape in each[0]} == {column}]
+    if not shapes:
+        return None
+    background, (form, *_) = forms_in_reach(model, Grammar(model, without, shapes))
+    levels = levels_of_law(form.best, background.conditions)
+    return _by_levels(model, replace(form.scope, shapes=(levels,)), p, rng) if levels is not None else None
+
+
 def _surface(scope: WrittenLaw, columns: Sequence[str], without: ModelFit) -> FreeCurve:
     """The surface of these columns in one scope that a fit without it tells of."""
     c = without.setup.observations.conditions

@@ -120,6 +120,31 @@ def _wave(s: Shape) -> str:
     return f"varies periodically with {in_words(s.column)}, period {_value(s, s.width)}"
 
 
+def form_in_words(law: WrittenLaw) -> str:
+    """The formula of a law: "a parabola in the logarithm of the pull speed about 0.2 mm/s"."""
+    names = [in_words(s.column) for s in law.shapes]
+    if len(names) > 1:
+        return f"a product of {' and '.join(names)}"
+    (s,), (column,) = law.shapes, names
+    at = f"{column} = {_value(s, s.place)}"
+    words = {
+        "linear": f"a straight line in {column}",
+        "log": f"a straight line in the logarithm of {column}",
+        "optimum": f"a parabola in {column} about {_value(s, s.place)}",
+        "log optimum": f"a parabola in the logarithm of {column} about {_value(s, s.place)}",
+        "step": f"a step at {at}",
+        "soft step": f"a gradual step at {at}",
+        "ramp": f"a straight line {'above' if s.high > s.place else 'below'} {at}",
+        "window": f"another value for {column} from {_value(s, s.place)} to {_value(s, s.place + s.width)}",
+        "hump": f"a hump at {at}",
+        "saturating": f"an exponential approach to a limit along {column}, over {_value(s, abs(s.width))}",
+        "wave": f"a wave along {column} of period {_value(s, s.width)}",
+        "curve": f"a curve along {column}",
+        "levels": f"another value at each value of {column}",
+    }
+    return words.get(s.kind, f"another value where {column} is {s.level or _value(s, s.place)}")
+
+
 def _value(s: Shape, x: float) -> str:
     factor, unit = _readable(s.column)
     return f"{general(factor * x)} {unit}".rstrip()
@@ -136,7 +161,8 @@ def tied_laws(ties: Sequence[WrittenLaw], *, by_values: bool = False) -> str:
     if not ties:
         return ""
     opening = "Formulas that these values do not contradict" if by_values else "This design cannot distinguish it from"
-    names = "; ".join(f"{tie.formula()} ({subject(tie)})" for tie in ties[:NAMED])
+    of_what = ["" if by_values else f" ({said[0].lower()}{said[1:]})" for said in map(subject, ties[:NAMED])]
+    names = "; ".join(form_in_words(tie) + of for tie, of in zip(ties, of_what, strict=False))
     more = f"; and {len(ties) - NAMED} more" if len(ties) > NAMED else ""
     return f"{opening}: {names}{more}."
 
@@ -152,8 +178,10 @@ def discovery_sentence(d: Discovery) -> str:
 def held_sentence(h: KnownLaw) -> str:
     """Whether a law of another campaign held in this one, where it was tested."""
     if h.untested is not None:
-        return "The law changes nothing in this design." if h.untested[0] == "no effect" else (
-            f"The law cannot be tested here: {untested_clause(h.untested)}."
+        return (
+            "The law changes nothing in this design."
+            if h.untested[0] == "no effect"
+            else (f"The law cannot be tested here: {untested_clause(h.untested)}.")
         )
     opening = {
         "held": "The law held", "not held": "The law did not hold",
