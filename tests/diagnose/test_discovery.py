@@ -474,10 +474,13 @@ def test_the_formulas_that_pass_through_the_values_are_listed_and_no_other() -> 
     assert not {"linear", "log", "step"} & kinds
 
 
-def test_where_the_strongest_misfit_follows_few_values_these_are_told_with_its_chance(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(diagnosis_with_laws, "LEVEL_OF_LAWS", 0.0)  # nothing is found by search
+@pytest.fixture
+def nothing_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnosis_with_laws, "discover_laws", lambda *_, **__: Discovery((), (), 0))
+
+
+@pytest.mark.usefixtures("nothing_is_searched")
+def test_where_the_strongest_misfit_follows_few_values_these_are_told_with_its_chance() -> None:
     d = examined_dip()
     law = the_law_of(d)
     assert (d.verdict.verdict, d.verdict.misfits[0].covariate) == ("unknown", "speed_mm_s")
@@ -485,14 +488,26 @@ def test_where_the_strongest_misfit_follows_few_values_these_are_told_with_its_c
     assert law.levels["0.2"].low < 100 * np.expm1(DIP["0.2"]) < law.levels["0.2"].high < 0.0
 
 
-@pytest.mark.parametrize("column", ["specimen_run", "run_order", "normal_load_N", "temperature_C", "specimen A1"])
-def test_a_misfit_of_a_column_of_the_series_of_loads_or_of_many_values_has_no_law_of_its_values(
+@pytest.mark.usefixtures("nothing_is_searched")
+@pytest.mark.parametrize("column", ["specimen_run", "temperature_C", "specimen A1"])
+def test_a_misfit_of_the_series_of_many_values_or_of_one_specimen_has_no_law_of_its_values(
     column: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(diagnosis_with_laws, "LEVEL_OF_LAWS", 0.0)
+    monkeypatch.setattr(diagnosis_with_laws, "LIKELY", -np.inf)  # whatever it gains
     d = examined_dip()
     (first, *_) = d.verdict.misfits
     d = replace(d, verdict=replace(d.verdict, misfits=(replace(first, covariate=column),)))
+    assert with_laws(d).laws.laws == ()
+
+
+@pytest.mark.usefixtures("nothing_is_searched")
+@pytest.mark.parametrize("changed", [{"p_adjusted": 0.01}, {"covariate": "operator"}])
+def test_a_misfit_within_chance_or_of_values_that_gain_little_has_no_law_of_its_values(
+    changed: dict[str, object],
+) -> None:
+    d = examined_dip()
+    (first, *_) = d.verdict.misfits
+    d = replace(d, verdict=replace(d.verdict, misfits=(replace(first, **changed),)))
     assert with_laws(d).laws.laws == ()
 
 
