@@ -275,7 +275,9 @@ def test_a_curve_from_which_the_fit_gains_nothing_is_no_law(monkeypatch: pytest.
     assert found() == ()
 
 
-@pytest.mark.parametrize(("column", "expected"), [("specimen_run", 0.0005), ("run_order", 0.0005), ("hold_s", 0.005)])
+@pytest.mark.parametrize(
+    ("column", "expected"), [("specimen_run", 0.0005), ("run_order", 0.0005), ("date", 0.0005), ("hold_s", 0.005)]
+)
 def test_beside_certain_days_and_drift_a_law_of_the_series_has_to_be_rarer_and_others_not(
     column: str, expected: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

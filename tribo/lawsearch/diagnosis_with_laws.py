@@ -17,12 +17,10 @@ from tribo.diagnostics.inference import nuisance_layers, pattern_corrections
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
-from tribo.lawsearch.free_search import OF_SERIES
-from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
+from tribo.lawsearch.grammar import OF_SERIES, PRESSURES, WrittenLaw, column_values
 from tribo.lawsearch.known_laws import KnownLaw, law_layer, validate_law, validate_laws
 from tribo.lawsearch.model_choice import (
     SAME,
-    SERIES,
     FoundLaw,
     choose_levels,
     levels_of_cause,
@@ -68,8 +66,8 @@ def with_laws(
         without=settled,
     )  # fmt: skip
     found = search(with_known)
-    if not found.laws and (law := _values_of_misfit(d, with_known, settled, level, rng)) is not None:
-        found = replace(found, laws=(law,))
+    if not found.laws and (of_values := _values_of_misfit(d, with_known, settled, level, rng)) is not None:
+        found = replace(found, laws=(of_values,))
     idle_beside: tuple[str, ...] = ()
     if found.laws and (idle := _explained_by_laws(d, found.laws[-1].model, level)):
         without = refitted(with_known, [a for a in with_known.acting if a.name not in idle])
@@ -204,7 +202,7 @@ def _values_of_misfit(
         return None
     strongest = d.verdict.misfits[0]
     column = SAME.get(strongest.covariate, strongest.covariate)
-    law = choose_levels(model, column, {*settled, *OF_SERIES, *SERIES}, strongest.p_adjusted, rng)
+    law = choose_levels(model, column, {*settled, *OF_SERIES}, strongest.p_adjusted, rng)
     return law if law is not None and law.model.score - model.score >= LIKELY else None
 
 

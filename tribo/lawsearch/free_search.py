@@ -29,12 +29,11 @@ from tribo.lawsearch.free_curves import (
     knots_of,
     likeliest_products,
 )
-from tribo.lawsearch.grammar import ALIKE, ALL, UNITS, WrittenLaw, scopes_of
+from tribo.lawsearch.grammar import ALIKE, ALL, OF_SERIES, UNITS, WrittenLaw, scopes_of
 from tribo.lawsearch.scoring import Projection, effects_of, terms_of
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
-OF_SERIES = {"run_order", "specimen_run", "elapsed_s", "clock_h"}  # days, drift and run-in follow these
 MOST_COLUMNS = 12  # of which every two may have a surface; the columns with a meaning of their own come first
 NOISES = np.array([1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.15])  # variance that a law leaves where it acts, of that before
 DIRECTIONS = {1: 24, 2: 6}  # principal courses of each column of a curve, and of a surface

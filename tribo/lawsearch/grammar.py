@@ -309,6 +309,8 @@ SOFT = (120.0, 60.0, 40.0, 28.0, 20.0, 14.0, 10.0)  # the same of soft steps
 ZEROS = (-1.0, -0.4, 0.0, 0.15, 0.3, 0.5)  # of a factor, from the lowest value in shares of the range
 FINE = 41  # places of a shape that is looked at closely
 TIMES = frozenset({"run_order", "elapsed_s", "clock_h", "date"})  # what days and drift follow as well
+OF_SERIES = TIMES | {"specimen_run"}  # and what run-in follows
+SUCCESSIVE = OF_SERIES - {"clock_h"}  # columns that follow each other through a series
 # Columns that say the same in another unit or count, so that their product is no law of two columns.
 PRESSURES = frozenset({"pressure_Pa", "contact_pressure_Pa"})
 ALIKE = (

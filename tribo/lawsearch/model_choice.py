@@ -33,12 +33,14 @@ from tribo.lawsearch.free_curves import (
     fitted_curve,
     knots_of,
 )
-from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, certain_pair, free_columns, free_scopes, likeliest
+from tribo.lawsearch.free_search import FreeSearch, certain_pair, free_columns, free_scopes, likeliest
 from tribo.lawsearch.grammar import (
     BOTH,
     LOAD_TERM,
     MOST_VALUES,
+    OF_SERIES,
     PRESSURES,
+    SUCCESSIVE,
     UNITS,
     Shape,
     WrittenLaw,
@@ -81,7 +83,6 @@ MARGIN = {True: 2.0 * CLOSE, False: CLOSE}
 # column cannot be told from it; between its column and another one of the series, the likelier counts.
 MARGIN_OF_COVARIATE = {True: CLOSE, False: 0.0}
 SAME = {"speed_mm_s": "speed_m_s", "started_at": "elapsed_s"}  # columns of mechanisms by their names in the grammar
-SERIES = {"run_order", "specimen_run", "elapsed_s", "date"}  # columns that follow each other through a series
 
 
 @dataclass(frozen=True)
@@ -765,7 +766,7 @@ def _followed(a: Acting) -> set[str]:
 def _of_columns(c: Conditions, columns: set[str]) -> list[tuple[tuple[Shape, ...], float]]:
     """The shapes of one column and its products, or the products of two; a product costs what choosing among these is
     worth. A column of the series has the laws of the others of the series, too."""
-    alike = SERIES if len(columns) == 1 and columns <= SERIES else columns
+    alike = SUCCESSIVE if len(columns) == 1 and columns <= SUCCESSIVE else columns
     every = []
     for shape, cost in shapes_of(c):
         followed = {s.column for s in shape}
@@ -781,7 +782,7 @@ def without_rivals(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, dict[str
 
     They stay where they are clearly better: what this campaign cannot tell apart, the other one has told.
     """
-    columns = set(law.columns) | (SERIES if set(law.columns) & SERIES else set())
+    columns = set(law.columns) | (SUCCESSIVE if set(law.columns) & SUCCESSIVE else set())
     rivals = [a for a in model.acting if _followed(a) & columns]
     if not rivals:
         return model, {}

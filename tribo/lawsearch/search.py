@@ -15,8 +15,8 @@ from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.inference import gain_on_groups
 from tribo.diagnostics.observations import session_of
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
-from tribo.lawsearch.free_search import OF_SERIES, FreeSearch, free_columns, free_scopes
-from tribo.lawsearch.grammar import TIMES, WrittenLaw
+from tribo.lawsearch.free_search import FreeSearch, free_columns, free_scopes
+from tribo.lawsearch.grammar import OF_SERIES, TIMES, WrittenLaw
 from tribo.lawsearch.model_choice import CLOSE, FoundLaw, choose_form, choose_free
 from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.records import FloatArray
