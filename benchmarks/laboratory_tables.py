@@ -305,13 +305,13 @@ def by_level(rows: list[Row]) -> str:
 
 FOUND = 4.5  # strength from which an observer who knows all covariances finds a change
 MOST_TIED = 3
-SERIES = {"run_order", "elapsed_s", "date", "started_at", "time of day", "specimen_run"}
+SERIES = {"run_order", "elapsed_s", "date", "started_at", "time of day", "clock_h", "specimen_run"}
 # The recorded columns that an effect follows, by all names that an answer may use
 FOLLOWS = {
     "temperature": {"temperature_C"}, "outside:temperature": {"temperature_C"}, "humidity": {"humidity_pct"},
     "outside:humidity": {"humidity_pct"}, "velocity_dependence": {"speed_m_s", "speed_mm_s"},
     "contact_ageing": {"hold_s"}, "covariate:operator": {"operator"}, "run_in": {"specimen_run"},
-    "outside:day": {"time of day", "time_of_day", "hour", "elapsed_s", "run_order", "started_at"},
+    "outside:day": {"time of day", "clock_h", "elapsed_s", "run_order", "started_at"},
     "outside:counterface": {"run_order", "elapsed_s", "date", "started_at"},
 }  # fmt: skip
 
