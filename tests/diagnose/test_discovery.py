@@ -522,6 +522,17 @@ def test_a_misfit_that_a_law_explains_on_the_way_is_listed_no_more_but_that_of_a
     assert [m.covariate for m in v.misfits] == ["speed_m_s", "sample"]
 
 
+@pytest.mark.usefixtures("nothing_is_searched")
+def test_the_strongest_misfit_that_a_law_leaves_is_said_with_its_column(monkeypatch: pytest.MonkeyPatch) -> None:
+    d = examined_dip()
+    monkeypatch.setattr(diagnosis_with_laws, "screen_left", lambda *_, **__: d.screened)  # as if the law explained none
+    v = worded(with_laws(d).verdict)
+    (remainder,) = (layer for layer in v.layers if layer.kind == "remainder")
+    assert (v.shows.within_chance, remainder.name) == (False, "speed_mm_s")
+    assert f"A misfit remains beyond chance: {remainder.text}" in v.text
+    assert [m.covariate for m in v.misfits].count("speed_mm_s") == 1
+
+
 def test_a_law_by_values_is_written_and_read_again(tmp_path: Path) -> None:
     dip = with_a_dip()
     (tmp_path / "law.toml").write_text(law_text(dip.law, dip.parameters, "three speeds"), encoding="utf-8")

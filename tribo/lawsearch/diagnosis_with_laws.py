@@ -10,7 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from tribo.diagnostics.candidates import LIKELY, beside_others, refitted
-from tribo.diagnostics.contrasts import screen_left
+from tribo.diagnostics.conclusion import each_once, misfits_of, remainder_layers
+from tribo.diagnostics.contrasts import Screen, screen_left
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.inference import nuisance_layers, pattern_corrections
@@ -93,11 +94,10 @@ def with_laws(
     if not with_known.acting and found.laws:  # nor is a misfit left of a column that the laws explain on the way
         told |= {m.covariate for m in left_over.misfits if m.covariate not in {"sample", *open_columns}}
     verdict = with_misfits(left_over, found, told, with_known)
-    open_columns -= explained_by_laws
+    remain = _remaining(model, left, verdict, level)
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
-        *(x for x in verdict.layers if x.kind == "remainder" and x.name in open_columns),
-        *nuisance_layers(model, asked),
+        *remainder_layers(remain), *nuisance_layers(model, asked),
     )  # fmt: skip
     next_test = verdict.next_test
     alike = [law.ties if law.levels else (law.law, *law.ties) for law in found.laws]
@@ -109,7 +109,16 @@ def with_laws(
         acted_on = _acted_on(law, model.setup.observations.conditions)
         next_test = first_test_of(with_known, *law.columns, sample=acted_on)
     shows = replace(verdict.shows, within_chance=bool(left.p.min() >= level))
-    return replace(d, laws=found, verdict=replace(verdict, layers=layers, next_test=next_test, shows=shows))
+    misfits = each_once((*verdict.misfits, *remain))
+    verdict = replace(verdict, misfits=misfits, layers=layers, next_test=next_test, shows=shows)
+    return replace(d, laws=found, verdict=verdict)
+
+
+def _remaining(model: ModelFit, left: Screen, v: Verdict, level: float) -> list[Misfit]:
+    """The strongest misfit that laws leave beyond chance, and those of the columns that were remainders before."""
+    o, before = model.setup.observations, {layer.name for layer in v.layers if layer.kind == "remainder"}
+    first, *others = misfits_of(left, level, model.residual, o.conditions, o.flat) or (None,)
+    return [] if first is None else [first, *(m for m in others if m.covariate in before)]
 
 
 def discover_on_campaign(

@@ -322,7 +322,8 @@ def _evidence(v: Verdict) -> Iterator[str]:
         yield tied_laws(getattr(law.shows, "ties", ()), by_values=bool(law.levels))
     if shows.within_chance is not None and v.verdict not in ("no_misfit", "named"):
         within = f"With this included, the remaining differences are within chance{_and_error(v)}."
-        yield within if shows.within_chance else "A misfit remains."
+        remains = ": ".join(["A misfit remains beyond chance", *(layer.text for layer in of_kind(v, "remainder")[:1])])
+        yield within if shows.within_chance else f"{remains.rstrip('.')}."
     if shows.across:
         yield across_sentence(shows.across)
     yield from _simulation(v.model)
