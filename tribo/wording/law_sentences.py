@@ -178,10 +178,8 @@ def discovery_sentence(d: Discovery) -> str:
 def held_sentence(h: KnownLaw) -> str:
     """Whether a law of another campaign held in this one, where it was tested."""
     if h.untested is not None:
-        return (
-            "The law changes nothing in this design."
-            if h.untested[0] == "no effect"
-            else (f"The law cannot be tested here: {untested_clause(h.untested)}.")
+        return "The law changes nothing in this design." if h.untested[0] == "no effect" else (
+            f"The law cannot be tested here: {untested_clause(h.untested)}."
         )
     opening = {
         "held": "The law held", "not held": "The law did not hold",
