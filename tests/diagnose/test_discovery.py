@@ -220,7 +220,7 @@ def test_a_campaign_without_misfit_is_searched_and_none_is_found(quiet: Diagnosi
 
 
 def test_a_law_that_no_contrast_had_shown_is_a_misfit(found: Discovery, quiet: Diagnosis) -> None:
-    v = with_misfits(quiet.verdict, found, (), quiet.baseline)
+    v = with_misfits(quiet.verdict, found, (), (), quiet.baseline)
     assert v.verdict == "unknown"
     assert [(m.observable, m.covariate) for m in v.misfits] == [("sliding", "temperature_C")]
     assert v.misfits[0].low < v.misfits[0].effect_percent < v.misfits[0].high
@@ -231,7 +231,7 @@ def test_a_law_that_no_contrast_had_shown_is_a_misfit(found: Discovery, quiet: D
 
 def test_a_law_beside_a_cause_leaves_it_a_part_of_the_answer(found: Discovery, quiet: Diagnosis) -> None:
     cause = Cause("suction", 1.0, {})
-    v = with_misfits(replace(quiet.verdict, verdict="named", causes=(cause,)), found, (), quiet.baseline)
+    v = with_misfits(replace(quiet.verdict, verdict="named", causes=(cause,)), found, (), (), quiet.baseline)
     assert (v.verdict, v.causes) == ("partly", (cause,))
     assert "A misfit remains beyond chance" in worded(v).text
 
@@ -514,9 +514,7 @@ def test_a_misfit_within_chance_or_of_values_that_gain_little_has_no_law_of_its_
 def test_a_misfit_that_a_law_explains_on_the_way_is_listed_no_more_but_that_of_a_pattern_is() -> None:
     d = examined_dip()
     (first, *_) = d.verdict.misfits
-    others = tuple(
-        replace(first, covariate=name, sample=sample) for name, sample in (("run_order", ""), ("sample", "A"))
-    )
+    others = replace(first, covariate="run_order"), replace(first, covariate="sample", sample="A")
     v = with_laws(replace(d, verdict=replace(d.verdict, misfits=(first, *others)))).verdict
     assert v.shows.within_chance
     assert [m.covariate for m in v.misfits] == ["speed_m_s", "sample"]

@@ -20,13 +20,7 @@ from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, N
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
 from tribo.lawsearch.grammar import OF_SERIES, PRESSURES, WrittenLaw, column_values
 from tribo.lawsearch.known_laws import KnownLaw, law_layer, validate_law, validate_laws
-from tribo.lawsearch.model_choice import (
-    SAME,
-    FoundLaw,
-    choose_levels,
-    levels_of_cause,
-    without_refuted_causes,
-)
+from tribo.lawsearch.model_choice import SAME, FoundLaw, choose_levels, levels_of_cause, without_refuted_causes
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray, Ingested
@@ -90,10 +84,7 @@ def with_laws(
         if p < level and contrast.kind != "mechanism"
     }  # fmt: skip
     left_over = without_causes(d.verdict, gone, idle_beside)
-    told = explained_by_laws - open_columns
-    if not with_known.acting and found.laws:  # nor is a misfit left of a column that the laws explain on the way
-        told |= {m.covariate for m in left_over.misfits if m.covariate not in {"sample", *open_columns}}
-    verdict = with_misfits(left_over, found, told, with_known)
+    verdict = with_misfits(left_over, found, explained_by_laws, open_columns, with_known)
     remain = _remaining(model, left, verdict, level)
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
@@ -117,8 +108,8 @@ def with_laws(
 def _remaining(model: ModelFit, left: Screen, v: Verdict, level: float) -> list[Misfit]:
     """The strongest misfit that laws leave beyond chance, and those of the columns that were remainders before."""
     o, before = model.setup.observations, {layer.name for layer in v.layers if layer.kind == "remainder"}
-    first, *others = misfits_of(left, level, model.residual, o.conditions, o.flat) or (None,)
-    return [] if first is None else [first, *(m for m in others if m.covariate in before)]
+    beyond = misfits_of(left, level, model.residual, o.conditions, o.flat)
+    return [m for k, m in enumerate(beyond) if k == 0 or m.covariate in before]
 
 
 def discover_on_campaign(
@@ -180,13 +171,23 @@ def with_levels_of_causes(v: Verdict, model: ModelFit) -> Verdict:
     return replace(v, layers=layers)
 
 
-def with_misfits(v: Verdict, found: Discovery, told: Collection[str], before: ModelFit) -> Verdict:
-    """The verdict with the laws found as its misfits, in place of those of the columns that they ``told`` all about;
-    ``before`` is the model without these laws."""
+def with_misfits(
+    v: Verdict, found: Discovery, explained: Collection[str], open_columns: Collection[str], before: ModelFit
+) -> Verdict:
+    """The verdict with the laws found as its misfits, in place of those of the columns that they ``explained`` and left
+    nothing of, as of ``open_columns``; ``before`` is the model without these laws.
+
+    Where that has no causes, laws alone explain the campaign, and what is not open of other columns goes, too; what a
+    pattern is off by stays.
+    """
     if not found.laws:
         return v
     outcome = AS_MISFIT.get(v.verdict, v.verdict)
-    kept = tuple(m for m in v.misfits if m.covariate not in told)
+    kept = tuple(
+        m for m in v.misfits
+        if m.covariate in open_columns
+        or (m.covariate not in explained and (before.acting or m.covariate == "sample"))
+    )  # fmt: skip
     if outcome == v.verdict and len(kept) == len(v.misfits):
         return v
     misfits = []

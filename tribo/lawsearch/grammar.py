@@ -313,9 +313,7 @@ OF_SERIES = TIMES | {"specimen_run"}  # and what run-in follows
 SUCCESSIVE = OF_SERIES - {"clock_h"}  # columns that follow each other through a series
 # Columns that say the same in another unit or count, so that their product is no law of two columns.
 PRESSURES = frozenset({"pressure_Pa", "contact_pressure_Pa"})
-ALIKE = (
-    PRESSURES, frozenset({"run_order", "specimen_run", "elapsed_s"}),
-)  # fmt: skip
+ALIKE = (PRESSURES, SUCCESSIVE)
 
 
 def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[Shape, ...], float]]:

@@ -139,10 +139,9 @@ def form_in_words(law: WrittenLaw) -> str:
         "hump": f"a hump at {at}",
         "saturating": f"an exponential approach to a limit along {column}, over {_value(s, abs(s.width))}",
         "wave": f"a wave along {column} of period {_value(s, s.width)}",
-        "curve": f"a curve along {column}",
-        "levels": f"another value at each value of {column}",
+        "level": f"another value where {column} is {s.level or _value(s, s.place)}",
     }
-    return words.get(s.kind, f"another value where {column} is {s.level or _value(s, s.place)}")
+    return words[s.kind]
 
 
 def _value(s: Shape, x: float) -> str:

@@ -290,7 +290,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
         these = "this mechanism" if len(v.causes) == 1 else "these mechanisms"
         yield f"With {these} included, the remaining differences are within chance{_and_error(v)}."
     elif v.verdict == "partly" and not laws:
-        yield f"A misfit remains beyond chance: {v.misfits[0].text if v.misfits else 'no single column explains it.'}"
+        yield _remains(v.misfits)
     elif v.verdict == "unknown" and (apart := patterns_apart(v.misfits)):
         yield (
             f"{joined(apart)} differ from the model independently of each other, and no recorded column explains the "
@@ -321,12 +321,18 @@ def _evidence(v: Verdict) -> Iterator[str]:
             yield law.text
         yield tied_laws(getattr(law.shows, "ties", ()), by_values=bool(law.levels))
     if shows.within_chance is not None and v.verdict not in ("no_misfit", "named"):
-        within = f"With this included, the remaining differences are within chance{_and_error(v)}."
-        remains = ": ".join(["A misfit remains beyond chance", *(layer.text for layer in of_kind(v, "remainder")[:1])])
-        yield within if shows.within_chance else f"{remains.rstrip('.')}."
+        if shows.within_chance:
+            yield f"With this included, the remaining differences are within chance{_and_error(v)}."
+        else:
+            yield _remains(of_kind(v, "remainder"))
     if shows.across:
         yield across_sentence(shows.across)
     yield from _simulation(v.model)
+
+
+def _remains(left: Sequence[Layer | Misfit]) -> str:
+    """That a misfit remains, and what the first of those ``left`` says."""
+    return f"A misfit remains beyond chance: {left[0].text if left else 'no single column explains it.'}"
 
 
 def _and_error(v: Verdict) -> str:
