@@ -291,10 +291,52 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
     monkeypatch.setattr(naming, "_misfit_in_own_column", lambda cause, *_: cause.acting.name == "run_in")
     monkeypatch.setattr(naming, "_picked_again", lambda layers, *_: layers)
     monkeypatch.setattr(naming, "_standing", lambda layers, *_: layers)
-    found = naming.name_causes(start, left, (), 0.01, lambda model: left)
+    found = naming.name_causes(start, left, (), lambda model: 0.01, lambda model: left)
     assert [[c.acting.name for c in alike] for alike in found.causes] == [["suction"]]
     assert offered == [set(), set(), {"run_in"}]
     assert found.wrong_in_form == ("run_in",)
+
+
+def named_at(
+    monkeypatch: pytest.MonkeyPatch, beside_one: float, picked: str = "suction"
+) -> tuple[list[str], list[Any]]:
+    """The causes that are named where each layer leaves a misfit of 0.005 until there are three, and the models that
+    were screened. The level is 0.001 without causes and ``beside_one`` with some; ``picked`` is what is picked again in
+    place of suction."""
+    start: Any = SimpleNamespace(model=SimpleNamespace(setup=None))
+    names, screened_models = ("suction", "run_in", "humidity"), []
+
+    def left_by(model: Any) -> Any:
+        screened_models.append(model)
+        return SimpleNamespace(p=np.array([0.005 if len(model) < 3 else 0.5]))
+
+    def picked_again(found: Named, *_: Any) -> Named:
+        return found if picked == "suction" else layered(picked, *[a.name for a in found.acting[1:]])
+
+    monkeypatch.setattr(naming, "weigh", lambda *_: [])
+    monkeypatch.setattr(naming, "allowed_wrong_form", lambda model: model)
+    monkeypatch.setattr(naming, "start_effects", lambda model: SimpleNamespace(model=model))
+    monkeypatch.setattr(naming, "_grown", lambda found, *_: layered(*names[: len(found.causes) + 1]))
+    monkeypatch.setattr(naming, "_misfit_in_own_column", lambda *_: False)
+    monkeypatch.setattr(naming, "_picked_again", picked_again)
+    monkeypatch.setattr(naming, "_standing", lambda found, *_: found)
+    first: Any = SimpleNamespace(p=np.array([0.0005]))
+    level_of: Any = lambda model: 0.001 if model is start.model else beside_one  # noqa: E731
+    found = naming.name_causes(start, first, (), level_of, left_by)
+    return [a.name for a in found.acting], screened_models
+
+
+def test_a_further_cause_is_looked_for_at_the_level_beside_those_that_are_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert named_at(monkeypatch, 0.001)[0] == ["suction"]
+    assert named_at(monkeypatch, 0.01)[0] == ["suction", "run_in", "humidity"]
+
+
+def test_what_is_left_is_screened_again_only_where_other_causes_were_picked(monkeypatch: pytest.MonkeyPatch) -> None:
+    every = [("suction",), ("suction", "run_in"), ("suction", "run_in", "humidity")]
+    assert named_at(monkeypatch, 0.01)[1] == every
+    assert named_at(monkeypatch, 0.01, "tilt")[1] == [*every, ("tilt", "run_in", "humidity")]
 
 
 def screen_of(contrasts: list[Any], strength: list[float], p: list[float]) -> Screen:

@@ -14,7 +14,7 @@ from blind.direct import ingested
 from blind.tribometer import hide
 from support import first_quick
 
-from tribo.diagnostics import inference
+from tribo.diagnostics import diagnosis, inference
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import precision_of
 from tribo.diagnostics.model import FIXED
@@ -141,6 +141,19 @@ def test_of_nine_sizes_six_at_least_lie_within_their_intervals() -> None:
 def test_the_level_is_a_tenth_only_beside_certain_days_and_drift() -> None:
     assert diagnosed(1, drift, small=False).share_of_level == 0.1
     assert diagnosed(1, None, small=True).share_of_level == 1.0
+
+
+def test_what_a_cause_explains_of_days_and_drift_makes_the_level_no_stricter_beside_it() -> None:
+    d = diagnosed(1, None, (("run_in", 2.0),), small=True)
+    assert diagnosis.is_certain_to_move(d.baseline)
+    assert [c.mechanism for c in d.verdict.causes] == ["run_in"]
+    assert d.share_of_level == 1.0
+
+
+def test_days_beside_a_cause_keep_the_level_strict() -> None:
+    d = diagnosed(1, days, (("run_in", 2.0),), small=True)
+    assert [c.mechanism for c in d.verdict.causes] == ["run_in"]
+    assert d.share_of_level == 0.1
 
 
 def test_the_finding_tells_the_drift() -> None:

@@ -10,14 +10,14 @@ from blind.bench import Design
 from blind.direct import ingested
 from blind.tribometer import hide
 
-from tribo.diagnostics import diagnosis, examine
+from tribo.diagnostics import candidates, diagnosis, examine
 from tribo.diagnostics.candidates import judged, refitted, with_errors_of_patterns_anew
 from tribo.diagnostics.contrasts import Screen, screen
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.model import PATTERN, Acting, Setup
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.mechanisms import MECHANISMS
-from tribo.records import FloatArray
+from tribo.records import FloatArray, Ingested
 
 from .known import acting, baseline, contrasts_of, made
 from .test_days_and_drift import SMALL, days
@@ -30,11 +30,14 @@ def nothing(s: Setup) -> FloatArray:
     return np.zeros((s.observations.n, 2))
 
 
+def campaign(name: str, *values: float) -> Ingested:
+    return made(acting(name, *values) if name else nothing, seed=0, design=ONCE)
+
+
 @cache
 def screens(name: str, *values: float) -> tuple[ModelFit, Screen, Screen]:
     """The model without causes, its screen, and the same with the errors of the patterns estimated anew."""
-    campaign = made(acting(name, *values) if name else nothing, seed=0, design=ONCE)
-    start = start_effects(baseline(campaign))
+    start = start_effects(baseline(campaign(name, *values)))
     seen = screen(start.model, contrasts_of(start.model), replicates=20, rng=np.random.default_rng(0))
     return start.model, seen, with_errors_of_patterns_anew(seen, start, ())
 
@@ -62,6 +65,15 @@ def test_where_nothing_is_hidden_no_contrast_is_stronger() -> None:
     _, seen, anew = screens("")
     assert np.array_equal(seen.strength, anew.strength)
     assert np.array_equal(seen.p, anew.p)
+
+
+def test_a_size_that_is_estimated_anew_has_to_earn_what_a_further_parameter_has_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _, seen, anew = screens(CAVITIES, 0.15)
+    monkeypatch.setattr(candidates, "PER_PARAMETER", 0.0)
+    free = with_errors_of_patterns_anew(seen, start_effects(baseline(campaign(CAVITIES, 0.15))), ())
+    assert strength(free, CAVITIES) ** 2 - strength(anew, CAVITIES) ** 2 == pytest.approx(2.0, abs=0.01)
 
 
 def test_a_cause_is_no_stronger_by_a_form_that_chance_was_not_given() -> None:

@@ -254,20 +254,29 @@ class Named:
     weighed: tuple[CauseCandidate, ...] = ()
 
     @property
+    def acting(self) -> list[Acting]:
+        """The best mechanism of every cause."""
+        return [alike[0].acting for alike in self.causes]
+
+    @property
     def p_left(self) -> float:
         """Adjusted p value of what remains."""
         return float(self.left.p.min())
 
 
 def name_causes(
-    start: StartEffects, first: Screen, excluded: Collection[str], level: float, screen_of: Callable[[ModelFit], Screen]
+    start: StartEffects,
+    first: Screen,
+    excluded: Collection[str],
+    level_beside: Callable[[ModelFit], float],
+    screen_of: Callable[[ModelFit], Screen],
 ) -> Named:
     """Add layers while a misfit remains, then keep the mechanisms that stand beside the others.
 
-    ``first`` is the screen of the model without mechanisms and ``screen_of`` that of what a model leaves. The model of
-    the result is fitted without the remainders.
+    ``first`` is the screen of the model without mechanisms and ``screen_of`` that of what a model leaves, in which a
+    misfit has a chance below ``level_beside`` that model. The model of the result is fitted without the remainders.
     """
-    named = Named(start.model, first)
+    named, level = Named(start.model, first), level_beside(start.model)
     weighed: tuple[CauseCandidate, ...] = ()
     for _ in range(MAX_LAYERS):
         if named.p_left >= level:
@@ -279,15 +288,15 @@ def name_causes(
         grown = _grown(named, before.model, ranked, level)
         if grown is None:
             break
-        left = screen_of(grown.model)
+        left, beside = screen_of(grown.model), level_beside(grown.model)
         newest = grown.causes[-1][0] if len(grown.causes) > len(named.causes) else None
-        if newest is not None and _misfit_in_own_column(newest, left, level):
+        if newest is not None and _misfit_in_own_column(newest, left, beside):
             named = replace(named, wrong_in_form=tuple(sorted({*named.wrong_in_form, newest.name})))
         else:
-            named = replace(grown, left=left)
+            named, level = replace(grown, left=left), beside
     standing = _standing(_picked_again(named, excluded, first, level), first, level)
-    if standing is not named:
-        named = replace(standing, left=screen_of(standing.model))
+    left = named.left if standing.acting == named.acting else screen_of(standing.model)
+    named = replace(standing, left=left)
     if named.remainders:
         model = fit(start.model.setup, named.model.acting, start=named.model)
         named = replace(named, model=model)
@@ -301,8 +310,8 @@ def best_beyond_chance(ranked: Sequence[CauseCandidate], seen: Screen, level: fl
 
 
 def with_errors_of_patterns_anew(seen: Screen, start: StartEffects, excluded: Collection[str]) -> Screen:
-    """The screen where every likely cause is stronger by what the errors of the patterns earn when their size is
-    estimated beside it.
+    """The screen where every likely cause is stronger by what the errors of the patterns earn, beyond a further
+    parameter, when their size is estimated beside it.
 
     A screen tests near the noise of the model without causes. What a cause changes on all patterns looks there like
     patterns that the model describes badly, and its score is weak. All other noise stays as it is.
@@ -312,12 +321,14 @@ def with_errors_of_patterns_anew(seen: Screen, start: StartEffects, excluded: Co
     if not free.any():
         return seen
     strength = seen.strength.copy()
-    before, still = (fit(held_at(s, here, sizes), start=start.model) for here in (others, others | free))
+    before, still = (
+        fit(held_at(s, here, sizes), start.model.acting, start=start.model) for here in (others, others | free)
+    )
     for c in weigh(replace(start, model=before), excluded):
         here = [contrast.acting == c.acting for contrast in seen.contrasts]
         if c.gain > LIKELY and any(here):
             earned = c.raw - judged(still, fit(still.setup, c.fit.acting, start=c.fit), 0.0).raw
-            strength[here] = np.sqrt(strength[here] ** 2 + 2.0 * max(earned, 0.0))
+            strength[here] = np.sqrt(strength[here] ** 2 + 2.0 * max(earned - PER_PARAMETER, 0.0))
     return replace(seen, strength=strength, p=np.array([seen.p_adjusted(float(value)) for value in strength]))
 
 

@@ -22,7 +22,7 @@ from tribo.diagnostics.candidates import (
     with_errors_of_patterns_anew,
 )
 from tribo.diagnostics.conclusion import conclude, exclusions, never_weighed
-from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
+from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, allowed_wrong_form, screen, screen_left
 from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.fit import ModelFit, fit, residual_on_flat
@@ -128,26 +128,44 @@ def examine(
         return effects, screened, exclusions(observations.conditions, evidence, effects.absorbed)
 
     effects, screened, barred = screened_at(s)
-    still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
-    certain = effects.model.score - (fit(still).score + offset) > LIKELY
+    moving = is_certain_to_move(effects.model)
     strongest = screened.contrasts[int(np.argmax(screened.strength))].column
-    share = BESIDE_DRIFT if certain and strongest != "time of day" else 1.0  # what comes back every day is no drift
-    level, of_nuisance = share * level, level
-    if screened.p.min() >= level and not certain:
+    strict = moving and strongest != "time of day"  # what comes back every day is no drift
+
+    def share_beside(model: ModelFit) -> float:
+        """Of the level of a misfit; causes may explain what looked like days and drift without them."""
+        return BESIDE_DRIFT if strict and (not model.acting or is_certain_to_move(model)) else 1.0
+
+    share = share_beside(effects.model)
+    if screened.p.min() >= share * level and not moving:
         screened = with_errors_of_patterns_anew(screened, effects, never_weighed(barred))
-    if screened.p.min() >= level:
+    if screened.p.min() >= share * level:
+        still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
         without = screened_at(still)
-        if without[1].p.min() < level and _a_cause_instead(effects.model, without, offset, level):
+        instead = without[1].p.min() < share * level
+        if instead and _a_cause_instead(effects.model, without, offset, share * level):
             effects, screened, barred = without
     named = None
-    if screened.p.min() < level:
+    if screened.p.min() < share * level:
+        never = never_weighed(barred)
 
         def screen_of(model: ModelFit) -> Screen:
-            return screen_left(model, replicates=replicates[1], rng=rng, progress=progress)
+            left = screen_left(model, replicates=replicates[1], rng=rng, progress=progress)
+            if left.p.min() < share_beside(model) * level or is_certain_to_move(model):
+                return left
+            return with_errors_of_patterns_anew(left, start_effects(allowed_wrong_form(model)), never)
 
-        named = name_causes(effects, screened, never_weighed(barred), level, screen_of)
-    verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, (level, of_nuisance), rng)
+        named = name_causes(effects, screened, never, lambda model: share_beside(model) * level, screen_of)
+        share = share_beside(named.model)
+    levels = share * level, level
+    verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, levels, rng)
     return Diagnosis(verdict, effects.model, screened, named, share_of_level=share)
+
+
+def is_certain_to_move(f: ModelFit) -> bool:
+    """Whether days and drift are certain beside the causes of a model."""
+    still, offset = held_still(f.setup, f.setup.group >= SPECIMEN_DRIFT)
+    return f.score - (fit(still, f.acting, start=f).score + offset) > LIKELY
 
 
 # Share of the level of a misfit that remains where days and drift are certain: their shapes are those of the model in
