@@ -7,6 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from blind.bench import Design
+from blind.direct import ingested
+from blind.tribometer import hide
 from laboratories.campaign import both, make, multiply
 from laboratories.handed_over import handed_over
 from laboratories.laboratory import Laboratory, day_of
@@ -21,6 +24,7 @@ from tribo.diagnostics.model import candidates, setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.verdict import Verdict
+from tribo.lawsearch.diagnosis_with_laws import with_laws
 from tribo.mechanisms import MECHANISMS
 from tribo.wording.verdict_sentences import worded
 
@@ -114,6 +118,22 @@ def test_patterns_that_the_model_describes_badly_at_one_load_have_no_wrong_weigh
 def test_the_remedy_says_which_weight_to_weigh() -> None:
     v, value = told_of("weight")
     assert v.causes[0].text.endswith(f"Weigh the {value.removesuffix('.0')} g weight.")
+
+
+def test_masses_of_two_steps_that_were_exchanged_are_two_wrong_weights_and_no_law_of_the_pressure() -> None:
+    b = hide(3, [], Design(samples=("F", "A", "B"), repeats=1))
+    for column in ("mass_g", "N"):
+        light, heavy = (float(b.tests.loc[b.tests["mass_g"] == mass, column].iloc[0]) for mass in (25.0, 50.0))
+        b.tests[column] = b.tests[column].replace({light: heavy, heavy: light})
+    d = with_laws(examine(ingested(b, 3), seed=3, replicates=(40, 20)), seed=3)
+    assert d.verdict.verdict == "named"
+    assert {(c.mechanism, c.choice) for c in d.verdict.causes} == {
+        ("wrong_weight", "mass 25 g"), ("wrong_weight", "mass 50 g"),
+    }  # fmt: skip
+    assert not [layer for layer in d.verdict.layers if layer.kind == "law"]
+    said = worded(d.verdict).sentence
+    assert "a wrong weight: mass 25 g" in said
+    assert "a wrong weight (mass 50 g) by " in said
 
 
 @pytest.mark.slow

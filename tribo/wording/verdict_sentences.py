@@ -170,11 +170,13 @@ def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
     first, *others = layers
     names = _alternatives(v, first)
     if len(names) == 1:
-        choice = f": {first.choice}" if first.choice else ""
-        subject = f"{sentence_case(meaning_in_words(names[0]))} ({name_in_words(names[0])}{choice}): this changes"
+        called = f"{name_in_words(names[0])}{_concerned(first, ': {}')}"
+        subject = f"{sentence_case(meaning_in_words(names[0]))} ({called}): this changes"
     else:
         subject = f"{sentence_case(_either(names))} (this campaign cannot tell which) changes"
-    also = [f"{_either(_alternatives(v, layer))} by {size_in_words(layer)}" for layer in others]
+    also = [
+        f"{_either(_alternatives(v, layer))}{_concerned(layer, ' ({})')} by {size_in_words(layer)}" for layer in others
+    ]
     also += [f"{name_in_words(c.mechanism)} ({_parameters(c)})" for c in v.causes if isinstance(c.shows, TraceEvidence)]
     also += [f"a change with {_columns(law)} by {size_in_words(law)}" for law in of_kind(v, "law")]
     added = f"; in addition, {joined(also)}" if also else ""
@@ -182,6 +184,11 @@ def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
     left = "; part of the difference from the model remains unexplained" if rest else ""
     up_to, most = ("", "") if first.over else ("up to ", f", most in {first.at}" if first.at else "")
     return f"{subject} {_where(v, first)} by {up_to}{size_in_words(first)}{most}{added}{left}."
+
+
+def _concerned(layer: Layer, said: str) -> str:
+    """The sample, specimen or value that a cause concerns, as it is ``said``; a column is in its name already."""
+    return said.format(layer.choice) if layer.choice and not layer.name.endswith(f":{layer.choice}") else ""
 
 
 def _where(v: Verdict, layer: Layer) -> str:
