@@ -6,6 +6,7 @@ A :class:`Diagnosis` holds the verdict with everything that it rests on, for fig
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
     from tribo.lawsearch.search import Discovery
 
+Screened = tuple[StartEffects, Screen, list[Excluded]]
 REPLICATES = 120
 REPLICATES_LEFT = 60
 
@@ -121,8 +123,8 @@ def examine(
     s = setup(observations, predictor or tabled_predictor(observations.patterns))
     evidence = direct_evidence(observations)
 
-    def screened_at(s: Setup) -> tuple[StartEffects, Screen, list[Excluded]]:
-        effects = start_effects(fit(s))
+    def screened_at(s: Setup, start: ModelFit | None = None) -> Screened:
+        effects = start_effects(fit(s, start.acting if start else (), start=start))
         contrasts = all_contrasts(s, effects.model.law, effects.acting, effects.courses)
         screened = screen(effects.model, contrasts, replicates=replicates[0], rng=rng, progress=progress)
         return effects, screened, exclusions(observations.conditions, evidence, effects.absorbed)
@@ -136,17 +138,7 @@ def examine(
         """Of the level of a misfit; causes may explain what looked like days and drift without them."""
         return BESIDE_DRIFT if strict and (not model.acting or is_certain_to_move(model)) else 1.0
 
-    share = share_beside(effects.model)
-    if screened.p.min() >= share * level and not moving:
-        screened = with_errors_of_patterns_anew(screened, effects, never_weighed(barred))
-    if screened.p.min() >= share * level:
-        still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
-        without = screened_at(still)
-        instead = without[1].p.min() < share * level
-        if instead and _a_cause_instead(effects.model, without, offset, share * level):
-            effects, screened, barred = without
-    named = None
-    if screened.p.min() < share * level:
+    def named_in(effects: StartEffects, screened: Screen, barred: Sequence[Excluded]) -> Named | None:
         never = never_weighed(barred)
 
         def screen_of(model: ModelFit) -> Screen:
@@ -155,8 +147,24 @@ def examine(
                 return left
             return with_errors_of_patterns_anew(left, start_effects(allowed_wrong_form(model)), never)
 
-        named = name_causes(effects, screened, never, lambda model: share_beside(model) * level, screen_of)
-        share = share_beside(named.model)
+        if screened.p.min() >= share_beside(effects.model) * level:
+            return None
+        return name_causes(effects, screened, never, lambda model: share_beside(model) * level, screen_of)
+
+    if screened.p.min() >= share_beside(effects.model) * level and not moving:
+        screened = with_errors_of_patterns_anew(screened, effects, never_weighed(barred))
+    named = named_in(effects, screened, barred)
+    fitted, left = (effects.model, screened) if named is None else (named.model, named.left)
+    of_fitted = share_beside(fitted) * level
+    if left.p.min() >= of_fitted and (named is None or (not named.remainders and is_certain_to_move(fitted))):
+        still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
+        beside = screened_at(still, fitted)
+        if beside[1].p.min() < of_fitted and _a_cause_instead(fitted, beside, offset, of_fitted):
+            without = beside if named is None else screened_at(still)
+            again = named_in(*without)
+            if again is not None and (named is None or len(again.causes) > len(named.causes)):
+                (effects, screened, barred), named = without, again
+    share = share_beside(effects.model if named is None else named.model)
     levels = share * level, level
     verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, levels, rng)
     return Diagnosis(verdict, effects.model, screened, named, share_of_level=share)
@@ -173,10 +181,8 @@ def is_certain_to_move(f: ModelFit) -> bool:
 BESIDE_DRIFT = 0.1
 
 
-def _a_cause_instead(
-    moving: ModelFit, still: tuple[StartEffects, Screen, list[Excluded]], offset: float, level: float
-) -> bool:
-    """Whether one mechanism, without any days and drift, explains what these would explain, and better, and leaves
+def _a_cause_instead(moving: ModelFit, still: Screened, offset: float, level: float) -> bool:
+    """Whether one more mechanism, without any days and drift, explains what these would explain, and better, and leaves
     nothing to them. What is the same within every session cannot be told from days.
 
     ``offset`` raises the score of the fits without days and drift.
