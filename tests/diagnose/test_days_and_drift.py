@@ -156,6 +156,20 @@ def test_days_beside_a_cause_keep_the_level_strict() -> None:
     assert d.share_of_level == 0.1
 
 
+def test_a_run_in_beside_another_cause_is_not_taken_for_drift(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = (("covariate:operator", 3.0), ("run_in", 1.2))
+    assert {c.mechanism for c in diagnosed(2, None, both, small=True).verdict.causes} == {name for name, _ in both}
+    monkeypatch.setattr(diagnosis, "_a_cause_instead", lambda *_: False)
+    as_drift = diagnosed.__wrapped__(2, None, both, small=True).verdict
+    assert [c.mechanism for c in as_drift.causes] == ["covariate:operator"]
+
+
+@pytest.mark.parametrize(("seed", "course"), first_quick([(11, specimen_drift), (12, drift), (13, specimen_steps)]))
+def test_drift_beside_a_cause_is_no_run_in(seed: int, course: Course) -> None:
+    v = diagnosed(seed, course, (("covariate:operator", 3.0),), small=True).verdict
+    assert [c.mechanism for c in v.causes] == ["covariate:operator"]
+
+
 def test_the_finding_tells_the_drift() -> None:
     assert "The series drifts by 6 % (root mean square; " in worded(diagnosed(1, drift, small=False).verdict).sentence
 
