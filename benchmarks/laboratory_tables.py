@@ -66,14 +66,9 @@ def must_hold(rows: list[Row]) -> str:
     """Every row of the promise that this run has campaigns for: what was asked, and what was counted."""
     lines = [
         *nuisance_lines(rows), *disturbed_lines(rows), *gap_lines(rows), *one_value_lines(rows), *level_lines(rows),
-        *free_law_lines(rows), *size_lines(rows), *cost_lines(rows),
+        *free_law_lines(rows), *size_lines(rows),
     ]  # fmt: skip
     return table(("what", "asked", "counted"), lines)
-
-
-def cost_lines(rows: list[Row]) -> list[Line]:
-    seconds = {cell: np.mean([r["seconds"] for r in of(rows, cell)]) for cell in dict.fromkeys(r["cell"] for r in rows)}
-    return [(f"{cell}: processor time, mean", "", f"{mean:.1f} s") for cell, mean in seconds.items()]
 
 
 # nuisance

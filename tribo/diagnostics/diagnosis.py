@@ -62,7 +62,7 @@ class Diagnosis:
     Where the extended model was run in the simulator itself, ``simulated_log_force`` (n, 2) is ln T of every test by it
     and ``extended_runs`` has one row a pair of runs. ``laws`` is the search for the laws of what the causes leave,
     where something was left. ``share_of_level`` is that of the level of a misfit at which the verdict was made: less
-    than one where days and drift are certain.
+    than one where days and drift are certain beside the causes.
     """
 
     verdict: Verdict
