@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from blind.tribometer import Design
 
+from tribo.diagnostics import inference
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import (
     DROP_90,
     _averaged,
     _log_freedom,
     _score_at,
+    change_with_open_form,
     estimates,
     intervals,
     pattern_factor,
@@ -197,6 +199,22 @@ def test_the_interval_of_a_formula_that_is_nearly_right_holds_the_size() -> None
                 held.append(e.low <= AGEING <= e.high)
     assert not any(as_right)
     assert sum(open_form) >= 6
+
+
+def test_what_an_interval_widens_by_it_widens_by_on_both_sides_in_proportion(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inference, "recovered", lambda *_: [(0.060, 0.058, 0.080)])
+    f = aged(0, 0.12)
+    (wider,) = with_open_form(f, 0).values()
+    assert wider.high - wider.low > 1.1 * 0.022
+    assert (wider.value - wider.low) / (wider.high - wider.value) == pytest.approx(0.002 / 0.020)
+
+
+def test_the_change_that_one_parameter_makes_is_as_uncertain_as_that_parameter() -> None:
+    f = aged(1, 0.12)
+    (e,) = with_open_form(f, 0).values()
+    value, low, high = change_with_open_form(f, 0, lambda values: float(2.0 * values[0]))
+    assert value == pytest.approx(2.0 * e.value, rel=0.02)
+    assert high - low == pytest.approx(2.0 * (e.high - e.low), rel=0.1)
 
 
 def test_where_the_formula_is_right_the_campaign_says_so() -> None:

@@ -29,6 +29,7 @@ from .known import acting, made
 FEW = (60, 25)
 EXACT = {"repeat_sd": (1e-6, 1e-6), "specimen_sd": 1e-9}
 QUIET = {"repeat_sd": (0.004, 0.004), "specimen_sd": 0.003}
+SHORT = Design(samples=("F", "B", "Sx"), repeats=2)
 FOUR = Design(samples=("F", "A", "B", "C", "Sx"), masses_g=(5.0, 25.0, 90.0, 138.5), pattern_error=1.5)
 
 
@@ -82,6 +83,19 @@ def test_a_cause_that_follows_a_recorded_column_is_told_from_its_lowest_to_its_h
     assert layer.over["low"] < 100 * (16**0.08 - 1) < layer.over["high"]
     assert "as the pull speed rises from 0.05 to 0.8 mm/s" in v.sentence
     assert "up to" not in v.sentence
+
+
+def test_a_run_in_that_outlasts_the_pulls_is_told_by_what_they_show_of_it() -> None:
+    """Of a run-in over as many pulls as were made, neither the size nor the number of pulls is known by itself."""
+    hidden, shown = hide(404, [("run_in", 1.5)], SHORT), hide(404, [], SHORT)
+    change = np.log(hidden.sliding / shown.sliding)
+    run = hidden.tests["specimen_run"].to_numpy()
+    truth = 100 * np.expm1(change[run == run.max()].mean() - change[run == run.min()].mean())
+    (layer,) = [x for x in examine(ingested(hidden, 404), replicates=(40, 20)).verdict.layers if x.kind == "cause"]
+    assert layer.parameters["c"].high > 2.0
+    assert layer.over is not None
+    assert layer.over["low"] < truth < layer.over["high"] < 0.0
+    assert layer.over["high"] - layer.over["low"] < 15.0
 
 
 def test_a_cause_is_certain_although_something_without_a_law_is_left(beside: Diagnosis) -> None:

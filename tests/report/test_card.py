@@ -5,6 +5,7 @@ from __future__ import annotations
 import html as html_text
 import json
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,12 @@ import pytest
 from report.conftest import Written
 from report.laid_out import html
 from report.synthetic import verdict_of
-from tribo.diagnostics.verdict import Cause, Estimate, Verdict
+from tribo.diagnostics.verdict import Cause, Estimate, Layer, Verdict
 from tribo.errors import Problem
 from tribo.mechanisms import MECHANISMS
 from tribo.records import LawFit, SetAside, Study
 from tribo.wording.card import Card, card_law, card_of, card_text, to_know, verdict_text
-from tribo.wording.verdict_sentences import why_next, worded
+from tribo.wording.verdict_sentences import finding, why_next, worded
 
 LAYER: dict[str, Any] = {
     "kind": "cause", "name": "suction", "samples": ["B", "C"], "regimes": ["static"], "p_adjusted": 1e-9,
@@ -98,6 +99,25 @@ def test_a_cause_that_the_traces_show_stands_in_the_finding_beside_those_of_the_
     both = worded(replace(found, causes=(offset, *found.causes), next_test=None))
     said = "; in addition, an offset of the load cell (F 0 = 0.00600 N (90 % interval 0.00500 to 0.00700))"
     assert said in both.sentence
+
+
+def test_a_second_law_stands_in_the_finding_with_the_term_that_it_changes() -> None:
+    law = Layer("law", "temperature_C", (), ("static", "sliding"), 1e-6, -30.0, -35.0, -25.0, text="Friction is lower.")
+    of_adhesion = SimpleNamespace(law=SimpleNamespace(columns=("humidity_pct",), acts_on="adhesion term"))
+    second = replace(law, name="humidity_pct", effect_percent=40.0, low=30.0, high=50.0, shows=of_adhesion)
+    v = replace(verdict_of(FOUND), verdict="partly", causes=(), layers=(law, second))
+    assert finding(v) == (
+        "Friction is lower; in addition, a change of the adhesion term with the humidity by +40 % "
+        "(90 % interval +30 to +50 %)."
+    )
+
+
+def test_a_further_cause_says_which_sample_it_concerns() -> None:
+    area = {**LAYER, "name": "pattern_geometry", "choice": "S", "effect_percent": -20.0}
+    operator = {**LAYER, "name": "covariate:operator", "choice": "operator", "effect_percent": 5.0}
+    said = finding(verdict_of(FOUND | {"layers": [LAYER, area, operator]}))
+    assert "; in addition, a wrong area fraction (S) by −20 % (" in said
+    assert ") and a dependence on operator by +5 % (" in said
 
 
 def test_one_sentence_states_the_finding_wherever_it_is_said(study: Study) -> None:

@@ -15,6 +15,7 @@ from tribo.diagnostics.direct_evidence import OF_ZERO, Evidence, stated_evidence
 from tribo.diagnostics.effect_sizes import misfit_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
 from tribo.diagnostics.inference import (
+    change_with_open_form,
     gain,
     gain_of_zero,
     nuisance_layers,
@@ -228,14 +229,18 @@ def _over_recorded_values(best: CauseCandidate, amplitude: Estimate, layer: Laye
     first, last = here[x[here] <= low_end], here[x[here] >= high_end]
     regimes = [REGIMES.index(r) for r in layer.regimes]
 
-    def change(size: float) -> float:
-        effect = effect_of(f.setup, f.law, acting, np.array([size, *best.values[1:]]))[:, regimes]
-        return float(percent(effect[last].mean() - effect[first].mean()))
+    def change(values: FloatArray) -> float:
+        effect = effect_of(f.setup, f.law, acting, values)[:, regimes]
+        return float(effect[last].mean() - effect[first].mean())
 
-    low, high = sorted((change(amplitude.low), change(amplitude.high)))
+    if len(acting.mechanism.parameters) > 1:
+        ends = change_with_open_form(f, len(f.acting) - 1, change).tolist()
+    else:
+        ends = [change(np.array([size])) for size in (amplitude.value, amplitude.low, amplitude.high)]
+    value, *between = (float(percent(end)) for end in ends)
     return {
         "column": column, "from": float(x[first].mean()), "to": float(x[last].mean()),
-        "percent": change(amplitude.value), "low": low, "high": high,
+        "percent": value, "low": min(between), "high": max(between),
     }  # fmt: skip
 
 

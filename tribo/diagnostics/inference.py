@@ -7,7 +7,7 @@ it is that large here. The gain is a cross-validation by whole samples, specimen
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -77,11 +77,10 @@ def with_open_form(f: ModelFit, index: int) -> dict[str, Estimate]:
     """The values and intervals of the parameters of a mechanism whose formula may be nearly right only.
 
     Its change of ln T may differ by a smooth course along what it follows. How large that is, the campaign tells: the
-    average over FORM_SHARES, each weighed by how likely it makes the campaign.
+    average over FORM_SHARES, each weighed by how likely it makes the campaign. What an interval widens by, it widens by
+    on both sides in proportion.
     """
-    fits = [f] + [_with_form(f, index, share) for share in FORM_SHARES]
-    log_weight = np.array([g.score + _log_freedom(g) for g in fits])
-    weight = softmax(log_weight)
+    weight, fits = _open_forms(f, index)
     values = np.array([g.values[index] for g in fits])
     variances = np.array([standard_errors(g, index) for g in fits]) ** 2
     middle = weight @ values
@@ -89,10 +88,50 @@ def with_open_form(f: ModelFit, index: int) -> dict[str, Estimate]:
     found = {}
     each = zip(f.acting[index].mechanism.parameters, recovered(f, index), strict=True)
     for k, (p, (value, low, high)) in enumerate(each):
-        below, above = (float(np.hypot(x, NORMAL_90 * np.sqrt(further[k]))) for x in (value - low, high - value))
+        half = max(0.5 * (high - low), 1e-300)
+        wider = float(np.hypot(half, NORMAL_90 * np.sqrt(further[k]))) / half
+        below, above = wider * (value - low), wider * (high - value)
         value = float(np.clip(value + middle[k] - values[0, k], p.low, p.high))
         found[p.name] = Estimate(value, max(value - below, p.low), min(value + above, p.high), p.unit)
     return found
+
+
+def change_with_open_form(f: ModelFit, index: int, change: Callable[[FloatArray], float]) -> FloatArray:
+    """The value and the interval, (3,), of the ``change`` that all parameters (k,) of a mechanism make together, its
+    formula nearly right only (:func:`with_open_form`).
+
+    Where the data tell the change and not each parameter, the interval of one parameter alone says far too much of it.
+    """
+    weight, fits = _open_forms(f, index)
+    changes, variances = (np.array(each) for each in zip(*(_propagated(g, index, change) for g in fits), strict=True))
+    middle = float(weight @ changes)
+    variance = weight @ (understated(f, index)[0] ** 2 * variances + (changes - middle) ** 2)
+    if f.setup.of_patterns.any():
+        likely, others = over_pattern_error(f)
+        moved = np.array([change(g.values[index]) for g in others])
+        variance += likely @ (moved - likely @ moved) ** 2
+    half = NORMAL_90 * float(np.sqrt(variance))
+    return middle + half * np.array([0.0, -1.0, 1.0])
+
+
+def _propagated(f: ModelFit, index: int, change: Callable[[FloatArray], float]) -> tuple[float, float]:
+    """A change by the parameters of one mechanism, and its variance by their joint covariance."""
+    values = f.values[index]
+    first = N_LAW + sum(len(v) for v in f.values[:index])
+    covariance = f.covariance[first : first + len(values), first : first + len(values)] / informed_share(f.noise)
+    slopes = []
+    for k, p in enumerate(f.acting[index].mechanism.parameters):
+        step = 1e-4 * (p.high - p.low)
+        low, high = (np.clip(values[k] + side * step, p.low, p.high) for side in (-1.0, 1.0))
+        ends = [np.where(np.arange(len(values)) == k, end, values) for end in (low, high)]
+        slopes.append((change(ends[1]) - change(ends[0])) / (high - low))
+    return change(values), float(np.array(slopes) @ covariance @ np.array(slopes))
+
+
+def _open_forms(f: ModelFit, index: int) -> tuple[FloatArray, list[ModelFit]]:
+    """The fit with the formula of a mechanism right and off by FORM_SHARES, and how likely each makes the campaign."""
+    fits = [f] + [_with_form(f, index, share) for share in FORM_SHARES]
+    return softmax(np.array([g.score + _log_freedom(g) for g in fits])), fits
 
 
 def _with_form(f: ModelFit, index: int, share: float) -> ModelFit:

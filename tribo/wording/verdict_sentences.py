@@ -27,6 +27,7 @@ from tribo.diagnostics.verdict import (
     Verdict,
 )
 from tribo.diagnostics.without_model import ColumnsTested
+from tribo.lawsearch.grammar import T
 from tribo.lawsearch.known_laws import KnownLaw
 from tribo.mechanisms.record import TraceEvidence
 from tribo.user_text import plain
@@ -147,8 +148,9 @@ def finding(v: Verdict) -> str:
     if layers and v.verdict != "unknown":
         return _caused(v, layers)
     if laws := of_kind(v, "law"):
-        law = laws[0].text.rstrip(".")
-        return f"{law}; {_by_no_mechanism(v)}." if v.verdict == "unknown" else f"{law}."
+        also = joined([_followed(law) for law in laws[1:]])
+        said = "; in addition, ".join(filter(None, [laws[0].text.rstrip("."), also]))
+        return f"{said}; {_by_no_mechanism(v)}." if v.verdict == "unknown" else f"{said}."
     if v.causes and v.verdict != "unknown":
         return _seen_in_traces(v)
     return _unknown(v)
@@ -178,7 +180,7 @@ def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
         f"{_either(_alternatives(v, layer))}{_concerned(layer, ' ({})')} by {size_in_words(layer)}" for layer in others
     ]
     also += [f"{name_in_words(c.mechanism)} ({_parameters(c)})" for c in v.causes if isinstance(c.shows, TraceEvidence)]
-    also += [f"a change with {_columns(law)} by {size_in_words(law)}" for law in of_kind(v, "law")]
+    also += [_followed(law) for law in of_kind(v, "law")]
     added = f"; in addition, {joined(also)}" if also else ""
     rest = v.verdict == "partly" and not v.shows.within_chance
     left = "; part of the difference from the model remains unexplained" if rest else ""
@@ -205,6 +207,13 @@ def _alternatives(v: Verdict, layer: Layer) -> list[str]:
 
 def _either(names: Sequence[str]) -> str:
     return " or ".join(map(name_in_words, names))
+
+
+def _followed(law: Layer) -> str:
+    """ "a change of the adhesion term with the humidity by +30 % (90 % interval +20 to +40 %)"."""
+    found = getattr(law.shows, "law", None)
+    term = f" of the {found.acts_on}" if found is not None and found.acts_on != T else ""
+    return f"a change{term} with {_columns(law)} by {size_in_words(law)}"
 
 
 def _columns(law: Layer) -> str:
