@@ -67,6 +67,15 @@ def test_where_nothing_is_hidden_no_contrast_is_stronger() -> None:
     assert np.array_equal(seen.p, anew.p)
 
 
+def test_a_cause_that_changes_one_pattern_alone_is_no_stronger(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, seen, anew = screens(CAVITIES, 0.15)
+    sample = model.setup.observations.conditions.sample
+    monkeypatch.setattr(candidates, "_changed_tests", lambda _: np.isin(sample, ("F", "B")))
+    alone = with_errors_of_patterns_anew(seen, start_effects(model), ())
+    assert strength(anew, CAVITIES) > strength(alone, CAVITIES) + 1.0
+    assert np.array_equal(alone.strength, seen.strength)
+
+
 def test_a_size_that_is_estimated_anew_has_to_earn_what_a_further_parameter_has_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

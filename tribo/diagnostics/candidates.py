@@ -313,20 +313,22 @@ def with_errors_of_patterns_anew(seen: Screen, start: StartEffects, excluded: Co
     """The screen where every likely cause is stronger by what the errors of the patterns earn, beyond a further
     parameter, when their size is estimated beside it.
 
-    A screen tests near the noise of the model without causes. What a cause changes on all patterns looks there like
-    patterns that the model describes badly, and its score is weak. All other noise stays as it is.
+    A screen tests near the noise of the model without causes. What a cause changes on several patterns looks there like
+    patterns that the model describes badly, and its score is weak. All other noise stays as it is. What is off on one
+    pattern alone is what an error of a pattern is, and by chance one is the largest.
     """
     s, sizes = start.model.setup, start.model.noise.sizes
     free, others = s.of_patterns, ~s.of_patterns & (s.group != FIXED)
     if not free.any():
         return seen
-    strength = seen.strength.copy()
+    strength, patterns = seen.strength.copy(), s.observations.conditions.sample
+    patterned = np.array([min(s.predictor.error[name].offset) > 0.0 for name in patterns.tolist()])
     before, still = (
         fit(held_at(s, here, sizes), start.model.acting, start=start.model) for here in (others, others | free)
     )
     for c in weigh(replace(start, model=before), excluded):
         here = [contrast.acting == c.acting for contrast in seen.contrasts]
-        if c.gain > LIKELY and any(here):
+        if c.gain > LIKELY and any(here) and len(np.unique(patterns[_changed_tests(c) & patterned])) > 1:
             earned = c.raw - judged(still, fit(still.setup, c.fit.acting, start=c.fit), 0.0).raw
             strength[here] = np.sqrt(strength[here] ** 2 + 2.0 * max(earned - PER_PARAMETER, 0.0))
     return replace(seen, strength=strength, p=np.array([seen.p_adjusted(float(value)) for value in strength]))
