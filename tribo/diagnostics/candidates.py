@@ -123,9 +123,8 @@ def _more_than_groups_differ(start: ModelFit, c: CauseCandidate) -> bool:
     if of_sessions or of_one_specimen:
         apart = _with_factors(s, here[:, None], np.full((1, 2), ANY_FACTOR))
     else:
-        sample, error = s.observations.conditions.sample, s.predictor.error
-        patterns = [name for name in np.unique(sample) if min(error[name].offset) > 0.0]
-        sizes = np.array([error[name].offset for name in patterns]).reshape(-1, 2)
+        sample, patterns = s.observations.conditions.sample, _patterned(s)
+        sizes = np.array([s.predictor.error[name].offset for name in patterns]).reshape(-1, 2)
         apart = _with_factors(s, here[:, None] & (sample[:, None] == np.array(patterns, str)), WITHIN * sizes)
     differs = fit(apart, start.acting, start=start)
     beside = judged(differs, fit(apart, c.fit.acting, start=c.fit), 0.0)
@@ -144,6 +143,12 @@ def _specimens_lie_apart(start: ModelFit, c: CauseCandidate) -> bool:
     moved = np.unique(s.specimen[_changed_tests(c)])
     apart = _with_factors(s, s.specimen[:, None] == moved, np.full((len(moved), 2), ANY_FACTOR))
     return fit(apart, start.acting, start=start).score > start.score
+
+
+def _patterned(s: Setup) -> list[str]:
+    """The samples about whose patterns the model may be wrong."""
+    names = np.unique(s.observations.conditions.sample).tolist()
+    return [name for name in names if min(s.predictor.error[name].offset) > 0.0]
 
 
 def _changed_tests(c: CauseCandidate) -> NDArray[np.bool_]:
@@ -321,14 +326,13 @@ def with_errors_of_patterns_anew(seen: Screen, start: StartEffects, excluded: Co
     free, others = s.of_patterns, ~s.of_patterns & (s.group != FIXED)
     if not free.any():
         return seen
-    strength, patterns = seen.strength.copy(), s.observations.conditions.sample
-    patterned = np.array([min(s.predictor.error[name].offset) > 0.0 for name in patterns.tolist()])
+    strength, sample, patterned = seen.strength.copy(), s.observations.conditions.sample, {*_patterned(s)}
     before, still = (
         fit(held_at(s, here, sizes), start.model.acting, start=start.model) for here in (others, others | free)
     )
     for c in weigh(replace(start, model=before), excluded):
         here = [contrast.acting == c.acting for contrast in seen.contrasts]
-        if c.gain > LIKELY and any(here) and len(np.unique(patterns[_changed_tests(c) & patterned])) > 1:
+        if c.gain > LIKELY and any(here) and len(patterned & {*sample[_changed_tests(c)].tolist()}) > 1:
             earned = c.raw - judged(still, fit(still.setup, c.fit.acting, start=c.fit), 0.0).raw
             strength[here] = np.sqrt(strength[here] ** 2 + 2.0 * max(earned - PER_PARAMETER, 0.0))
     return replace(seen, strength=strength, p=np.array([seen.p_adjusted(float(value)) for value in strength]))

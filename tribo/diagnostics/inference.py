@@ -116,16 +116,13 @@ def change_with_open_form(f: ModelFit, index: int, change: Callable[[FloatArray]
 
 def _propagated(f: ModelFit, index: int, change: Callable[[FloatArray], float]) -> tuple[float, float]:
     """A change by the parameters of one mechanism, and its variance by their joint covariance."""
-    values = f.values[index]
-    first = N_LAW + sum(len(v) for v in f.values[:index])
-    covariance = f.covariance[first : first + len(values), first : first + len(values)] / informed_share(f.noise)
-    slopes = []
+    values, slopes = f.values[index], []
     for k, p in enumerate(f.acting[index].mechanism.parameters):
         step = 1e-4 * (p.high - p.low)
         low, high = (np.clip(values[k] + side * step, p.low, p.high) for side in (-1.0, 1.0))
         ends = [np.where(np.arange(len(values)) == k, end, values) for end in (low, high)]
         slopes.append((change(ends[1]) - change(ends[0])) / (high - low))
-    return change(values), float(np.array(slopes) @ covariance @ np.array(slopes))
+    return change(values), float(np.array(slopes) @ _covariance(f, index) @ np.array(slopes))
 
 
 def _open_forms(f: ModelFit, index: int) -> tuple[FloatArray, list[ModelFit]]:
@@ -227,9 +224,14 @@ def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
 
 def standard_errors(f: ModelFit, index: int) -> list[float]:
     """Of every parameter of one mechanism, from the curvature; zero for one held at a bound."""
+    return [float(np.sqrt(max(d, 0.0))) for d in np.diag(_covariance(f, index))]
+
+
+def _covariance(f: ModelFit, index: int) -> FloatArray:
+    """Of the parameters (k,) of one mechanism, from the curvature, (k, k)."""
     first = N_LAW + sum(len(v) for v in f.values[:index])
-    diagonal = np.diag(f.covariance)[first : first + len(f.values[index])]
-    return [float(np.sqrt(max(d, 0.0) / informed_share(f.noise))) for d in diagonal]
+    here = slice(first, first + len(f.values[index]))
+    return f.covariance[here, here] / informed_share(f.noise)
 
 
 def informed_share(noise: Noise) -> float:
