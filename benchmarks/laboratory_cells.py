@@ -29,6 +29,7 @@ from laboratories.levels import (
 from laboratories.nuisance import Nuisance, draw_nuisance, mixture
 from laboratories.observer import Observer
 from laboratories.one_value import SIZES, hide_one_value
+from laboratories.searching_observer import search
 from laboratories.simple_laws import COLUMNS as SIMPLE_COLUMNS, FORMS, hide_simple_law
 from laboratory_answers import Row, answer, band_of_laws, diagnosed, errors_left_out, values_at_levels
 from run_lines import read_rows
@@ -185,9 +186,17 @@ def disturbed_law_row(piece: Piece) -> Row:
     nuisance, asked = disturbance(piece), stream(piece.seed, PLAN + 5).uniform(*LAW_STRENGTHS)
     laboratory = law_laboratory(piece.seed, repeats=2)
     made = make(piece.seed, laboratory, nuisance, hide_free_law(piece.seed, laboratory, piece.what["class"], asked))
-    observer = Observer(bare_bench(piece.seed, laboratory), laboratory, nuisance)
     row, d = with_answer(piece, made)
-    return row | {"strength": round(observer.strength(made.change), 3), **band_of_laws(d, made.change)}
+    return row | seen_by_observers(piece.seed, made, nuisance) | band_of_laws(d, made.change)
+
+
+def seen_by_observers(seed: int, made: Made, nuisance: tuple[Nuisance, ...]) -> Row:
+    """How clearly a law shows to an observer who knows its course, too, and what one finds who has to search for it."""
+    bare = bare_bench(seed, made.laboratory)
+    observer = Observer(bare, made.laboratory, nuisance)
+    found = search(observer, bare, made.bench)
+    searched = {"columns": list(found.columns), "chance": float(f"{found.chance:.3g}")}
+    return {"strength": round(observer.strength(made.change), 3), "searched": searched}
 
 
 # gaps

@@ -298,7 +298,8 @@ def by_level(rows: list[Row]) -> str:
 
 # effects and laws under nuisance
 
-FOUND = 4.5  # strength from which an observer who knows all covariances finds a change
+FOUND = 4.5  # strength from which an observer who knows all covariances and the course of a change finds it
+BY_CHANCE = 0.01  # below which an observer who has to search takes what is found for no chance
 MOST_TIED = 3
 SERIES = {"run_order", "elapsed_s", "date", "started_at", "time of day", "clock_h", "specimen_run"}
 # The recorded columns that an effect follows, by all names that an answer may use
@@ -366,11 +367,17 @@ def observer_finds(row: Row) -> bool:
     return float(row["strength"]) > FOUND
 
 
+def search_finds(row: Row) -> bool:
+    """Whether an observer who knows all covariances, and has to search, finds the columns of a law."""
+    found = row["searched"]
+    return set(row["truth"]["columns"]) <= set(found["columns"]) and found["chance"] < BY_CHANCE
+
+
 def disturbed_lines(rows: list[Row]) -> list[Line]:
     lines: list[Line] = []
     for under in ("5 %", "none"):
         effects, hidden_laws = of(rows, f"effects, {under}"), of(rows, f"laws, {under}")
-        seen, clear = [r for r in effects if observer_finds(r)], [r for r in hidden_laws if observer_finds(r)]
+        seen, clear = [r for r in effects if observer_finds(r)], [r for r in hidden_laws if search_finds(r)]
         if effects:
             sized = [r for r in effects if "interval" in r]
             lines += [
@@ -385,17 +392,19 @@ def disturbed_lines(rows: list[Row]) -> list[Line]:
             lines += [
                 (f"laws, nuisance {under}: columns right, of those the observer finds", "90 %",
                  share(clear, columns_right)),
-                *beside_none(rows, clear, under),
+                ("the same: of those that one finds who knows the course, too", "",
+                 share([r for r in hidden_laws if observer_finds(r)], columns_right)),
+                *beside_none(rows, hidden_laws, under),
                 ("the same: another physical column", "", share(hidden_laws, other_physical)),
                 ("the same: 90 % band holds the change, mean share of tests", "85 to 95 %", mean_band(hidden_laws)),
             ]  # fmt: skip
     return lines
 
 
-def beside_none(rows: list[Row], clear: list[Row], under: str) -> list[Line]:
+def beside_none(rows: list[Row], hidden_laws: list[Row], under: str) -> list[Line]:
     """Under nuisance: the campaigns whose columns are right where the same law is hidden without any."""
     right = {r["seed"] for r in of(rows, "laws, none") if columns_right(r)}
-    both = [r for r in clear if r["seed"] in right]
+    both = [r for r in hidden_laws if r["seed"] in right]
     label = "the same: of those whose columns are right without nuisance"
     return [(label, "", share(both, columns_right))] if under != "none" and both else []
 
@@ -419,7 +428,7 @@ def by_effect(rows: list[Row]) -> str:
     for cell in ("laws, none", "laws, 5 %"):
         for name in sorted({r["truth"]["class"] for r in of(rows, cell)}):
             g = [r for r in of(rows, cell) if r["truth"]["class"] == name]
-            seen = [r for r in g if observer_finds(r)]
+            seen = [r for r in g if search_finds(r)]
             plain = f"{np.median([r['truth']['rms_percent'] for r in g]):.1f} %"
             lines.append((cell, name, plain, len(g), len(seen), sum(map(columns_right, seen)),
                           sum(map(columns_right, g)), sum(map(other_physical, g)), mean_band(g)))  # fmt: skip

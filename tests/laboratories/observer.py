@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve
 
 from .campaign import LaboratoryBench, both
 from .laboratory import Laboratory, day_of
@@ -47,9 +47,10 @@ class Observer:
         specimen = np.tile(tests["specimen"].to_numpy(str), 2)
         day, regime = np.tile(day_of(tests), 2), np.repeat([0, 1], n)
         sd = repeat_sds(laboratory, tests).T.ravel()
-        covariance = np.diag(sd**2)
+        repeats = np.diag(sd**2)
         half = np.arange(n)
-        covariance[half, half + n] = covariance[half + n, half] = TOGETHER * sd[:n] * sd[n:]
+        repeats[half, half + n] = repeats[half + n, half] = TOGETHER * sd[:n] * sd[n:]
+        covariance = repeats.copy()
         loads, at = np.unique(bench.column("N"), return_inverse=True)
         of_one = _products([one_specimen(laboratory, rng)(np.log(loads)) for _ in range(draws)])
         place = np.concatenate([at, at + len(loads)])
@@ -72,14 +73,15 @@ class Observer:
             )
             place = np.concatenate([which * len(loads) + at, which * len(loads) + at + len(pairs)])
             covariance += of_pairs[np.ix_(place, place)]
-        self.factor = cho_factor(covariance)
+        self.repeats, self.others, self.tails = repeats, covariance - repeats, laboratory.tails
+        self.cholesky = np.linalg.cholesky(covariance)
         self.free = _free_laws(bench, patterns_known)
-        self.solved = cho_solve(self.factor, self.free)
+        self.solved = cho_solve((self.cholesky, True), self.free)
 
     def strength(self, change: np.ndarray) -> float:
         """The expected z of a change (n, 2) of ln T."""
         d = change.T.ravel()
-        own = cho_solve(self.factor, d)
+        own = cho_solve((self.cholesky, True), d)
         absorbed = np.linalg.lstsq(self.free.T @ self.solved, self.free.T @ own, rcond=None)[0]
         return float(np.sqrt(max(d @ own - (self.free.T @ own) @ absorbed, 0.0)))
 
