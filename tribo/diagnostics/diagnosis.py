@@ -6,7 +6,7 @@ A :class:`Diagnosis` holds the verdict with everything that it rests on, for fig
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,7 @@ from tribo.diagnostics.candidates import (
 )
 from tribo.diagnostics.conclusion import conclude, exclusions, never_weighed
 from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, allowed_wrong_form, screen, screen_left
-from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
+from tribo.diagnostics.direct_evidence import Evidence, certain_evidence, direct_evidence
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.fit import ModelFit, fit, residual_on_flat
 from tribo.diagnostics.model import SPECIMEN_DRIFT, Setup, effect_of, setup
@@ -122,52 +122,77 @@ def examine(
     observations = enough(observe(ingested))
     s = setup(observations, predictor or tabled_predictor(observations.patterns))
     evidence = direct_evidence(observations)
-
-    def screened_at(s: Setup, start: ModelFit | None = None) -> Screened:
-        effects = start_effects(fit(s, start.acting if start else (), start=start))
-        contrasts = all_contrasts(s, effects.model.law, effects.acting, effects.courses)
-        screened = screen(effects.model, contrasts, replicates=replicates[0], rng=rng, progress=progress)
-        return effects, screened, exclusions(observations.conditions, evidence, effects.absorbed)
-
-    effects, screened, barred = screened_at(s)
+    exam = _Examination(evidence, level, replicates, rng, progress)
+    effects, screened, barred = exam.screened(s)
     moving = is_certain_to_move(effects.model)
     strongest = screened.contrasts[int(np.argmax(screened.strength))].column
-    strict = moving and strongest != "time of day"  # what comes back every day is no drift
-
-    def share_beside(model: ModelFit) -> float:
-        """Of the level of a misfit; causes may explain what looked like days and drift without them."""
-        return BESIDE_DRIFT if strict and (not model.acting or is_certain_to_move(model)) else 1.0
-
-    def named_in(effects: StartEffects, screened: Screen, barred: Sequence[Excluded]) -> Named | None:
-        never = never_weighed(barred)
-
-        def screen_of(model: ModelFit) -> Screen:
-            left = screen_left(model, replicates=replicates[1], rng=rng, progress=progress)
-            if left.p.min() < share_beside(model) * level or is_certain_to_move(model):
-                return left
-            return with_errors_of_patterns_anew(left, start_effects(allowed_wrong_form(model)), never)
-
-        if screened.p.min() >= share_beside(effects.model) * level:
-            return None
-        return name_causes(effects, screened, never, lambda model: share_beside(model) * level, screen_of)
-
-    if screened.p.min() >= share_beside(effects.model) * level and not moving:
+    exam = replace(exam, strict=moving and strongest != "time of day")  # what comes back every day is no drift
+    if screened.p.min() >= exam.share_beside(effects.model) * level and not moving:
         screened = with_errors_of_patterns_anew(screened, effects, never_weighed(barred))
-    named = named_in(effects, screened, barred)
-    fitted, left = (effects.model, screened) if named is None else (named.model, named.left)
-    of_fitted = share_beside(fitted) * level
-    if left.p.min() >= of_fitted and (named is None or (not named.remainders and is_certain_to_move(fitted))):
-        still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
-        beside = screened_at(still, fitted)
-        if beside[1].p.min() < of_fitted and _a_cause_instead(fitted, beside, offset, of_fitted):
-            without = beside if named is None else screened_at(still)
-            again = named_in(*without)
-            if again is not None and (named is None or len(again.causes) > len(named.causes)):
-                (effects, screened, barred), named = without, again
-    share = share_beside(effects.model if named is None else named.model)
+    first = effects, screened, barred
+    (effects, screened, barred), named = exam.instead_of_drift(s, first, exam.named(*first))
+    share = exam.share_beside(effects.model if named is None else named.model)
     levels = share * level, level
     verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, levels, rng)
     return Diagnosis(verdict, effects.model, screened, named, share_of_level=share)
+
+
+@dataclass(frozen=True)
+class _Examination:
+    """How a campaign is examined: with the ``evidence`` of its traces, at which ``level`` of a misfit, and against how
+    many simulated campaigns. ``strict`` is whether a misfit has to be rarer beside certain days and drift."""
+
+    evidence: Mapping[str, Evidence]
+    level: float
+    replicates: tuple[int, int]
+    rng: np.random.Generator
+    progress: Progress | None
+    strict: bool = False
+
+    def screened(self, s: Setup, start: ModelFit | None = None) -> Screened:
+        """Every contrast of a campaign, and the mechanisms that are not weighed."""
+        effects = start_effects(fit(s, start.acting if start else (), start=start))
+        contrasts = all_contrasts(s, effects.model.law, effects.acting, effects.courses)
+        found = screen(effects.model, contrasts, replicates=self.replicates[0], rng=self.rng, progress=self.progress)
+        return effects, found, exclusions(s.observations.conditions, self.evidence, effects.absorbed)
+
+    def share_beside(self, model: ModelFit) -> float:
+        """Of the level of a misfit; causes may explain what looked like days and drift without them."""
+        return BESIDE_DRIFT if self.strict and (not model.acting or is_certain_to_move(model)) else 1.0
+
+    def named(self, effects: StartEffects, screened: Screen, barred: Sequence[Excluded]) -> Named | None:
+        """The causes of what is beyond chance; None where nothing is."""
+        never = never_weighed(barred)
+
+        def level_beside(model: ModelFit) -> float:
+            return self.share_beside(model) * self.level
+
+        def screen_of(model: ModelFit) -> Screen:
+            left = screen_left(model, replicates=self.replicates[1], rng=self.rng, progress=self.progress)
+            if left.p.min() < level_beside(model) or is_certain_to_move(model):
+                return left
+            return with_errors_of_patterns_anew(left, start_effects(allowed_wrong_form(model)), never)
+
+        if screened.p.min() >= level_beside(effects.model):
+            return None
+        return name_causes(effects, screened, never, level_beside, screen_of)
+
+    def instead_of_drift(self, s: Setup, first: Screened, named: Named | None) -> tuple[Screened, Named | None]:
+        """The same, or the causes that are named without days and drift where one more of them explains what these
+        would explain, and better."""
+        fitted, left = (first[0].model, first[1]) if named is None else (named.model, named.left)
+        level = self.share_beside(fitted) * self.level
+        if left.p.min() < level or (named is not None and (named.remainders or not is_certain_to_move(fitted))):
+            return first, named
+        still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
+        beside = self.screened(still, fitted)
+        if beside[1].p.min() >= level or not _a_cause_instead(fitted, beside, offset, level):
+            return first, named
+        without = beside if named is None else self.screened(still)
+        again = self.named(*without)
+        if again is None or (named is not None and len(again.causes) <= len(named.causes)):
+            return first, named
+        return without, again
 
 
 def is_certain_to_move(f: ModelFit) -> bool:

@@ -75,34 +75,39 @@ def with_laws(
     model = found.laws[-1].model if found.laws else with_known
     allowed = len(with_known.acting) if found.laws else 0
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress, allowed=allowed)
-    gone = {**(lost if found.laws else {}), **replaced}
-    explained_by_laws = settled | {name for law in found.laws for name in law.law.columns}
-    if "clock_h" in explained_by_laws:
-        explained_by_laws.add("time of day")  # its name among the contrasts
-    open_columns = {
-        contrast.column for contrast, p in zip(left.contrasts, left.p, strict=True)
-        if p < level and contrast.kind != "mechanism"
-    }  # fmt: skip
-    left_over = without_causes(d.verdict, gone, idle_beside)
-    verdict = with_misfits(left_over, found, explained_by_laws, open_columns, with_known)
+    left_over = without_causes(d.verdict, {**(lost if found.laws else {}), **replaced}, idle_beside)
+    told = settled | {name for law in found.laws for name in law.law.columns}
+    told |= {"time of day"} if "clock_h" in told else set()  # its name among the contrasts
+    verdict = with_misfits(left_over, found, told, _open_columns(left, level), with_known)
     remain = _remaining(model, left, verdict, level)
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
         *remainder_layers(remain), *nuisance_layers(model, asked),
     )  # fmt: skip
-    next_test = verdict.next_test
-    alike = [law.ties if law.levels else (law.law, *law.ties) for law in found.laws]
-    law = found.laws[0].law if found.laws else None
-    ties = [(first, second) for first, second, *_ in (laws for laws in alike if len(laws) > 1)]
-    if ties and not verdict.equivalent:
-        next_test = separating_test(*ties[0], model.setup.observations.conditions)
-    elif law is not None and not any(layer.kind == "cause" for layer in layers):
-        acted_on = _acted_on(law, model.setup.observations.conditions)
-        next_test = first_test_of(with_known, *law.columns, sample=acted_on)
     shows = replace(verdict.shows, within_chance=bool(left.p.min() >= level))
+    next_test = _next_test(found, verdict, any(layer.kind == "cause" for layer in layers), with_known)
     misfits = each_once((*verdict.misfits, *remain))
     verdict = replace(verdict, misfits=misfits, layers=layers, next_test=next_test, shows=shows)
     return replace(d, laws=found, verdict=verdict)
+
+
+def _open_columns(left: Screen, level: float) -> set[str]:
+    """The columns of what is left beyond chance."""
+    each = zip(left.contrasts, left.p, strict=True)
+    return {contrast.column for contrast, p in each if p < level and contrast.kind != "mechanism"}
+
+
+def _next_test(found: Discovery, v: Verdict, beside_causes: bool, before: ModelFit) -> NextTest | None:
+    """The test that separates tied laws; else, where no cause stands beside the first law, the first test of that."""
+    alike = [law.ties if law.levels else (law.law, *law.ties) for law in found.laws]
+    ties = [(first, second) for first, second, *_ in (laws for laws in alike if len(laws) > 1)]
+    conditions = before.setup.observations.conditions
+    if ties and not v.equivalent:
+        return separating_test(*ties[0], conditions)
+    if found.laws and not beside_causes:
+        law = found.laws[0].law
+        return first_test_of(before, *law.columns, sample=_acted_on(law, conditions))
+    return v.next_test
 
 
 def _remaining(model: ModelFit, left: Screen, v: Verdict, level: float) -> list[Misfit]:
