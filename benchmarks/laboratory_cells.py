@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from blind_cases import ALL_OR_NOTHING, UNSEEN, seed_of, times_half, true_parame
 
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.effects import EFFECTS
-from laboratories.campaign import HIDDEN, Made, bare_bench, make, stream
+from laboratories.campaign import HIDDEN, LaboratoryBench, Made, bare_bench, make, stream
 from laboratories.effects import NEEDS, hide_effect, strengths
 from laboratories.free_laws import CLASSES, hide_free_law, law_laboratory
 from laboratories.gaps import HOW, gaps
@@ -194,9 +194,13 @@ def seen_by_observers(seed: int, made: Made, nuisance: tuple[Nuisance, ...]) -> 
     """How clearly a law shows to an observer who knows its course, too, and what one finds who has to search for it."""
     bare = bare_bench(seed, made.laboratory)
     observer = Observer(bare, made.laboratory, nuisance)
-    found = search(observer, bare, made.bench)
-    searched = {"columns": list(found.columns), "chance": float(f"{found.chance:.3g}")}
-    return {"strength": round(observer.strength(made.change), 3), "searched": searched}
+    return {"strength": round(observer.strength(made.change), 3), **what_is_found(observer, bare, made.bench)}
+
+
+def what_is_found(observer: Observer, bare: LaboratoryBench, made: LaboratoryBench) -> Row:
+    """The columns that an observer finds who has to search, and their chance."""
+    found = search(observer, bare, made)
+    return {"searched": {"columns": list(found.columns), "chance": float(f"{found.chance:.3g}")}}
 
 
 # gaps
@@ -232,7 +236,15 @@ def free_law_row(piece: Piece) -> Row:
     d = diagnosed(handed_over(made.bench, piece.seed, FURTHER, searched), piece.seed)
     errors = errors_left_out(d, handed_over(made.bench, piece.seed), made.change, ~searched)
     row = {"truth": made.truth, "design": design_row(made), **answer(d.verdict)}
-    return row | errors | band_of_laws(d, made.change[searched])
+    return row | errors | band_of_laws(d, made.change[searched]) | found_in_part(piece.seed, made, searched)
+
+
+def found_in_part(seed: int, made: Made, searched: np.ndarray) -> Row:
+    """What an observer finds in the part of a campaign that is searched."""
+    tests = made.bench.tests[searched].reset_index(drop=True)
+    bare, part = (replace(bare_bench(seed, made.laboratory), tests=tests) for _ in range(2))
+    part.static, part.sliding = made.bench.static[searched], made.bench.sliding[searched]
+    return what_is_found(Observer(bare, made.laboratory), bare, part)
 
 
 # sizes

@@ -181,8 +181,10 @@ def one_value_lines(rows: list[Row]) -> list[Line]:
     if own:
         lines += [
             ("one value, patterns off by 15 %: named", "95 %", share(own, value_named)),
+            ("the same: of those the observer finds", "",
+             share([r for r in own if r["truth"]["strength"] > FOUND], value_named)),
             ("the same: another cause or law named", "at most 2 %", share(own, other_named)),
-        ]
+        ]  # fmt: skip
     if clean:
         blamed = share(clean, lambda r: bool(causes(r) or laws(r)))
         lines.append(("nothing hidden, patterns off by 15 %: a cause or law", "at most 1 %", blamed))
@@ -499,6 +501,8 @@ def free_law_lines(rows: list[Row]) -> list[Line]:
     worst = min(bands, key=lambda name: bands[name], default="")
     return [
         ("free laws: column or columns right", "90 %", share(own, columns_right)),
+        ("the same: the observer finds them", "", share(own, search_finds)),
+        ("the same: right of those the observer finds", "", share(list(filter(search_finds, own)), columns_right)),
         ("free laws: another physical column", "at most 2 %", share(own, other_physical)),
         ("free laws: error on tests left out within 10 % of that of the true law", "90 %", share(own, error_within)),
         ("free laws: 90 % band holds the change, mean share of tests", "85 to 95 %", mean_band(own)),
@@ -516,9 +520,11 @@ def by_class(rows: list[Row]) -> str:
     for part, told in parts.items():
         for name in sorted(set(map(told, own))):
             g = [r for r in own if told(r) == name]
-            counts = (sum(map(test, g)) for test in (columns_right, other_physical, error_within))
+            counts = (sum(map(test, g)) for test in (search_finds, columns_right, other_physical, error_within))
             lines.append((f"{part} {name}", len(g), *counts, mean_band(g)))
-    return table(("hidden", "campaigns", "columns right", "another physical", "error within 10 %", "band holds"), lines)
+    head = ("hidden", "campaigns", "the observer finds", "columns right", "another physical", "error within 10 %",
+            "band holds")  # fmt: skip
+    return table(head, lines)
 
 
 # sizes
