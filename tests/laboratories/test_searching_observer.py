@@ -61,3 +61,14 @@ def test_a_law_of_the_temperature_shows_less_where_days_are_nuisance() -> None:
     chances = [search(Observer(bare, laboratory, n, draws=300), bare, made).chance for n in (quiet, noisy)]
     assert chances[0] < 1e-4
     assert chances[0] < 0.01 * chances[1]
+
+
+def test_another_law_of_one_sample_is_no_law_of_a_column() -> None:
+    laboratory = law_laboratory(91, **SMALL)
+    bare, made = bare_bench(91, laboratory), make(91, laboratory).bench
+    observer = Observer(bare, laboratory, draws=300)
+    before = search(observer, bare, made)
+    multiply(made, 0.2 * (made.column("sample") == "A")[:, None] * np.ones(2))
+    after = search(observer, bare, made)
+    assert after.columns == before.columns
+    assert after.chance == pytest.approx(before.chance, rel=1e-6)
