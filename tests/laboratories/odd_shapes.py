@@ -14,6 +14,7 @@ Course = Callable[[np.ndarray], np.ndarray]
 TOGETHER = 0.5  # correlation of the static and the sliding deviation of a specimen, a pattern or a pull
 FAR_OUT = 1 / 10  # chance of a specimen that lies far out, and how many times farther
 FARTHER = 3.0
+HEAVY = 4  # degrees of freedom of repeats with heavy tails
 
 
 def odd_course(rng: np.random.Generator, low: float, high: float) -> Course:
@@ -99,8 +100,7 @@ def repeat_deviations(laboratory: Laboratory, tests: pd.DataFrame, rng: np.rando
     """By how much ln T of every test (n, 2) deviates for no reason."""
     unit = together(rng.normal(size=(2, len(tests)))).T
     if laboratory.tails == "heavy":
-        freedom = 4
-        unit = unit / np.sqrt(rng.chisquare(freedom, (len(unit), 1)) / (freedom - 2))
+        unit = unit / np.sqrt(rng.chisquare(HEAVY, (len(unit), 1)) / (HEAVY - 2))
     return np.asarray(unit * repeat_sds(laboratory, tests))
 
 

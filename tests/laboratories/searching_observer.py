@@ -19,13 +19,13 @@ from scipy.stats import chi2, rankdata
 
 from .campaign import LaboratoryBench, both
 from .observer import Observer
+from .odd_shapes import HEAVY
 
 NUMBERS = ("temperature_C", "humidity_pct", "film_um", "speed_mm_s", "hold_s", "wear_um", "run_order")
 NAMES = ("operator", "recipe")
 ALONE = (4, 8, 16)  # B-splines along one column
-TOGETHER = 4  # along each of two
+OF_A_SURFACE = 4  # along each of two
 STAIRS = 3  # steps along each of two
-HEAVY = 4  # degrees of freedom of heavy tails
 
 
 class Found(NamedTuple):
@@ -88,9 +88,8 @@ def _cholesky(observer: Observer, deviation: np.ndarray) -> np.ndarray:
     scale = (HEAVY - 2) / HEAVY * observer.repeats
     pulls = np.arange(n)[:, None] + np.array([0, n])
     block = pulls[:, :, None], pulls[:, None, :]
-    inverse, root_weight = np.linalg.inv(scale[block]), np.ones(2 * n)
+    inverse, repeats = np.linalg.inv(scale[block]), scale
     for _ in range(5):
-        repeats = scale / np.outer(root_weight, root_weight)
         lower = np.linalg.cholesky(repeats + observer.others)
         through = solve_triangular(lower, np.column_stack([repeats, deviation, observer.free]), lower=True)
         free = qr(through[:, 2 * n + 1 :], mode="economic")[0]
@@ -98,8 +97,9 @@ def _cholesky(observer: Observer, deviation: np.ndarray) -> np.ndarray:
         own, known = through[:, : 2 * n].T @ through[:, 2 * n], through[:, : 2 * n].T @ through[:, : 2 * n]
         squares = own[pulls][:, :, None] * own[pulls][:, None, :] + (repeats - known)[block]
         weight = (HEAVY + 2) / (HEAVY + np.sum(inverse * squares, axis=(1, 2)))
-        root_weight = np.tile(np.sqrt(weight), 2)
-    return np.linalg.cholesky(scale / np.outer(root_weight, root_weight) + observer.others)
+        root = np.tile(np.sqrt(weight), 2)
+        repeats = scale / np.outer(root, root)
+    return np.linalg.cholesky(repeats + observer.others)
 
 
 def _sets(names: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ def _courses(bench: LaboratoryBench) -> Iterator[tuple[tuple[str, ...], np.ndarr
         values = bench.column(name).astype(str)
         yield (name,), (values[:, None] == np.unique(values)[1:]).astype(float)
     for pair in combinations((name for name in numbers if name != "run_order"), 2):
-        for each in ([_splines(along[name], TOGETHER) for name in pair], [_stairs(along[name]) for name in pair]):
+        for each in ([_splines(along[name], OF_A_SURFACE) for name in pair], [_stairs(along[name]) for name in pair]):
             surface = np.einsum("ni,nj->nij", *each).reshape(len(bench.tests), -1)[:, 1:]
             yield pair, surface
 

@@ -127,7 +127,7 @@ def examine(
     moving = is_certain_to_move(effects.model)
     strongest = screened.contrasts[int(np.argmax(screened.strength))].column
     exam = replace(exam, strict=moving and strongest != "time of day")  # what comes back every day is no drift
-    if screened.p.min() >= exam.share_beside(effects.model) * level and not moving:
+    if screened.p.min() >= exam.level_beside(effects.model) and not moving:
         screened = with_errors_of_patterns_anew(screened, effects, never_weighed(barred))
     first = effects, screened, barred
     (effects, screened, barred), named = exam.instead_of_drift(s, first, exam.named(*first))
@@ -160,28 +160,29 @@ class _Examination:
         """Of the level of a misfit; causes may explain what looked like days and drift without them."""
         return BESIDE_DRIFT if self.strict and (not model.acting or is_certain_to_move(model)) else 1.0
 
+    def level_beside(self, model: ModelFit) -> float:
+        """That of a misfit beside the causes of a model."""
+        return self.share_beside(model) * self.level
+
     def named(self, effects: StartEffects, screened: Screen, barred: Sequence[Excluded]) -> Named | None:
         """The causes of what is beyond chance; None where nothing is."""
         never = never_weighed(barred)
 
-        def level_beside(model: ModelFit) -> float:
-            return self.share_beside(model) * self.level
-
         def screen_of(model: ModelFit) -> Screen:
             left = screen_left(model, replicates=self.replicates[1], rng=self.rng, progress=self.progress)
-            if left.p.min() < level_beside(model) or is_certain_to_move(model):
+            if left.p.min() < self.level_beside(model) or is_certain_to_move(model):
                 return left
             return with_errors_of_patterns_anew(left, start_effects(allowed_wrong_form(model)), never)
 
-        if screened.p.min() >= level_beside(effects.model):
+        if screened.p.min() >= self.level_beside(effects.model):
             return None
-        return name_causes(effects, screened, never, level_beside, screen_of)
+        return name_causes(effects, screened, never, self.level_beside, screen_of)
 
     def instead_of_drift(self, s: Setup, first: Screened, named: Named | None) -> tuple[Screened, Named | None]:
         """The same, or the causes that are named without days and drift where one more of them explains what these
         would explain, and better."""
         fitted, left = (first[0].model, first[1]) if named is None else (named.model, named.left)
-        level = self.share_beside(fitted) * self.level
+        level = self.level_beside(fitted)
         if left.p.min() < level or (named is not None and (named.remainders or not is_certain_to_move(fitted))):
             return first, named
         still, offset = held_still(s, s.group >= SPECIMEN_DRIFT)
